@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import logging
+import math
 import os
 import signal
 import sys
@@ -15,6 +16,7 @@ import threading
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from datetime import timedelta
 from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn
@@ -26,10 +28,8 @@ from rich.progress import (
     ProgressColumn,
     Task,
     TaskProgressColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
 )
+from rich.table import Column
 from rich.text import Text
 
 # Console output: results on standard output, everything else on standard error
@@ -128,21 +128,30 @@ def counted(lines: list[str]) -> list[str]:
 
 
 class _Description(ProgressColumn):
-    """Description of a progress bar, printed without markup."""
+    """Description of a progress bar, printed without markup, and shortened so that the bar is one line."""
 
     def render(self, task: Task) -> Text:
-        return Text(shortened(plain(task.description)))
+        return Text(shortened(plain(task.description)), no_wrap=True, overflow="ellipsis")
+
+
+class _Times(ProgressColumn):
+    """Elapsed time, and the remaining time if it is known."""
+
+    def render(self, task: Task) -> Text:
+        text = str(timedelta(seconds=int(task.elapsed or 0.0)))
+        if task.time_remaining:
+            text += f", {timedelta(seconds=math.ceil(task.time_remaining))} left"
+        return Text(text)
 
 
 def progress_bar() -> Progress:
-    """Return a progress bar with the remaining time, to be used as a context manager."""
+    """Return a progress bar with the remaining time, to be used as a context manager: one line in 80 columns."""
+    bar, share, times = (Column(no_wrap=True) for _ in range(3))
     return Progress(
         _Description(),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
+        BarColumn(14, table_column=bar),
+        TaskProgressColumn(table_column=share),
+        _Times(table_column=times),
         console=messages,
         speed_estimate_period=3600.0,  # work proceeds in bursts, so that only the whole of it indicates the speed
     )

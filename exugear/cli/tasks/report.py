@@ -27,13 +27,14 @@ from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.project import default_folder
 from exugear.report.findings.context import ReportError, choice_of
-from exugear.report.findings.design_changes import DesignStudy
+from exugear.report.findings.design_changes import LEAST_DB, DesignStudy
 from exugear.report.findings.other_design import check_ranges
 from exugear.report.findings.words import QUANTITIES
 from exugear.report.writer import Report, write_report
 from exugear.results.folder import CASE_FILE, read_stored_gearbox, time_noted, times_spent
 from exugear.results.run_file import load_run
 from exugear.steady.settings import SteadySettings, operating_speeds
+from exugear.steady.steady_file import load_response
 from exugear.system.gearbox_checks import usual_variant
 from exugear.system.modes import load_modes
 from exugear.system.tooth_mesh.laws.registry import LAWS
@@ -91,18 +92,17 @@ def _check_comparison(folder: Path, other: Path, allow_dir: Path | None) -> None
 
 
 def _compute_missing(folder: Path, allow_dir: Path | None) -> None:
-    """Compute missing modes of all models with runs or modes, and a response of the one with most degrees of freedom.
+    """Compute missing modes of all models with results, and a response of the one with most degrees of freedom.
 
     Existing files stay as they are, even if they are damaged or belong to other input. What takes long (tables, contact
     loss) or fails is left to the report, which lists it with its command.
     """
     models = []
-    for path in sorted(folder.glob("*/*/run.nc")):
-        with suppress(FileError, ValueError, KeyError):
-            models.append(choice_of(load_run(path, ()).attrs))
-    for path in sorted(folder.glob("*/*/modes.nc")):
-        with suppress(FileError, ValueError, KeyError):
-            models.append(choice_of(load_modes(path).attrs))
+    loaders = {"run.nc": lambda path: load_run(path, ()), "modes.nc": load_modes, "steady-*.nc": load_response}
+    for name, load in loaders.items():
+        for path in sorted(folder.glob(f"*/*/{name}")):
+            with suppress(FileError, ValueError, KeyError):
+                models.append(choice_of(load(path).attrs))
     if not models:
         return
     with suppress(BadInputError, FailedError), model_errors():
@@ -194,5 +194,7 @@ def _print_changes(study: DesignStudy) -> None:
 
 
 def _decibels(value: float) -> str:
+    if value <= LEAST_DB:
+        return f"<{LEAST_DB:g}"
     text = f"{value:+.1f}"
     return "0.0" if text in ("+0.0", "-0.0") else text

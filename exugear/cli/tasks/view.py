@@ -103,7 +103,7 @@ def _draw(
     resonances: list[ResonanceRow] = []
     if headline is not None and headline.response is not None:
         ranked = headline.ranking.resonances[: max(SHOWN_RESONANCES, resonance or 0)]
-        resonances = _resonance_rows(assembly, headline, ranked)
+        resonances = _resonance_rows(assembly, headline, ranked, words)
         about = f"Steady state at constant speed, {METHOD_LABELS[str(headline.response.attrs['method'])]}."
         if not ranked:
             about += " There is no resonance in the ranking."
@@ -166,7 +166,9 @@ def _mode_rows(modes: Modes, words: Labels, headline: Headline | None, ranked: S
     return rows
 
 
-def _resonance_rows(assembly: Assembly, headline: Headline, ranked: Sequence[Resonance]) -> list[ResonanceRow]:
+def _resonance_rows(
+    assembly: Assembly, headline: Headline, ranked: Sequence[Resonance], words: Labels
+) -> list[ResonanceRow]:
     """Return the resonances with their operating deflection shapes, without those that are not found again."""
     assert headline.response is not None
     shapes = deflection_shapes(
@@ -179,7 +181,7 @@ def _resonance_rows(assembly: Assembly, headline: Headline, ranked: Sequence[Res
         mode = headline.mode_of(resonance)
         row = ResonanceRow(
             number,
-            resonance.line,
+            words.line(words.order(resonance.line, resonance.order)),
             abs(resonance.speed) / RPM,
             resonance.frequency,
             resonance.amplitudes["error"].amplitude,

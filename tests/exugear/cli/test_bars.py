@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import io
+import re
+
 import pytest
+from rich.console import Console
 
 from exugear.cli.bars import Bars, files_read
-from exugear.cli.console import BadInputError, FailedError, exit_codes, model_errors
+from exugear.cli.console import BadInputError, FailedError, exit_codes, model_errors, progress_bar
 from exugear.gearbox.reading import GearboxFileError
 from exugear.system.statics import BalanceError
 from exugear.system.tooth_mesh.placement import MeshError
@@ -73,3 +77,23 @@ def test_who_looks_at_an_error_gets_that_of_the_command_line_with_its_cause():
     with pytest.raises(BadInputError) as told, model_errors():
         raise cause
     assert told.value.__cause__ is cause
+
+
+def test_a_bar_is_one_line_in_80_columns_and_names_what_is_left():
+    with progress_bar() as bar:
+        task = bar.add_task("bushing: 10.00 of 10 s, 8.89 simulated s per s, and a long name", total=4.0)
+        bar.update(task, completed=1.0)
+        bar.update(task, completed=2.0)
+        console = Console(width=80, file=io.StringIO(), color_system=None)
+        console.print(bar.make_tasks_table(bar.tasks))
+    (line,) = console.file.getvalue().splitlines()
+    assert "…" in line and " 50% " in line
+    assert re.search(r"0:00:00(, 0:00:\d\d left)?\s*$", line)
+
+
+def test_a_bar_without_a_known_end_states_the_elapsed_time_alone():
+    with progress_bar() as bar:
+        bar.add_task("report", total=None)
+        console = Console(width=80, file=io.StringIO(), color_system=None)
+        console.print(bar.make_tasks_table(bar.tasks))
+    assert "left" not in console.file.getvalue()

@@ -152,7 +152,7 @@ def test_resonances_are_those_of_the_command_line(browser: Any, operation: tuple
     assert len(rows) == min(10, len(summary["resonances"])) > 1
     for number, (row, resonance) in enumerate(zip(rows, summary["resonances"], strict=False), start=1):
         cells = row.locator("td").all_inner_texts()
-        assert cells[:2] == [str(number), resonance["line"]]
+        assert cells[:2] == [str(number), resonance["line"].replace(" x ", " × ")]
         assert float(cells[2]) == pytest.approx(abs(resonance["speed_rpm"]), abs=0.006)
         assert float(cells[3]) == pytest.approx(resonance["frequency_Hz"], abs=0.06)
         assert float(cells[4]) == pytest.approx(1e6 * resonance["error_m"], rel=0.006)
