@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 
 from exugear.cli.console import note
 from exugear.cli.tables import Column, print_table, print_text, wrapped
@@ -39,8 +39,8 @@ def print_rating(sheet: RatingSheet) -> None:
     """Print a rating sheet with its assumptions and neglected effects."""
     print_text(f"Rating to {sheet.edition}, method B; {sheet.load}")
     for title, flanks in _meshes(sheet):
-        rows = [*_rows(flanks, sheet.other_edition)]
-        print_table(f"Mesh {title}", rows, [Column(heading, heading) for heading in rows[0]])
+        columns = [Column("factor", _factor), *map(_column, flanks)]
+        print_table(f"Mesh {title}", _rows(flanks, sheet.other_edition), columns)
         for line in dict.fromkeys(line for flank in flanks for line in _remarks(flank)):
             note(line, style="yellow")
     for line in sheet.assumptions:
@@ -58,36 +58,33 @@ def _meshes(sheet: RatingSheet) -> Iterator[tuple[str, list[FlankSheet]]]:
         yield family if sense > 0 else f"{family}, reversed load", flanks
 
 
-def _rows(flanks: list[FlankSheet], other_edition: str) -> Iterator[dict[str, str]]:
+def _rows(flanks: list[FlankSheet], other_edition: str) -> Iterator[tuple[str, str, str]]:
+    """Yield the text and the name of each factor, and the part of a sheet that has it."""
     names = [name for block in _BLOCKS.values() for name in block]
     for name in names:
         if name not in _OF_2019 or any(name in flank.standard for flank in flanks):
-            yield _row(name, _WORDS.get(name, name), flanks, lambda one: one.standard)
+            yield _WORDS.get(name, name), name, "standard"
     for name in names:
         if any(name in flank.other_edition for flank in flanks):
-            yield _row(name, f"{name}, {other_edition}", flanks, lambda one: one.other_edition)
+            yield f"{name}, {other_edition}", name, "other_edition"
     if any(flank.finite_elements for flank in flanks):
-        for name in FINITE_ELEMENTS:
-            yield _row(name, f"{name}, finite elements", flanks, lambda one: one.finite_elements)
+        yield from ((f"{name}, finite elements", name, "finite_elements") for name in FINITE_ELEMENTS)
 
 
-def _row(
-    name: str, words: str, flanks: list[FlankSheet], figures: Callable[[FlankSheet], Mapping[str, float]]
-) -> dict[str, str]:
-    unit = UNITS.get(name, "")
-    values = {f"{flank.gear} {flank.flank}": sheet_value(name, figures(flank).get(name, math.nan)) for flank in flanks}
-    form = ".4g" if name == "N_L" else _DIGITS.get(unit, ".3f")
-    return {"factor": f"{words}, {unit}" if unit else words} | {
-        "\n".join(wrapped(label, GEAR_COLUMN)): _number(value, form) for label, value in values.items()
-    }
+def _factor(row: tuple[str, str, str]) -> str:
+    words, name, _ = row
+    return ", ".join(filter(None, (words, UNITS.get(name, ""))))
 
 
-def _number(value: float, form: str) -> str:
-    if math.isnan(value):
-        return "-"
-    if math.isinf(value):
-        return "inf."
-    return format(value, form)
+def _column(flank: FlankSheet) -> Column:
+    """Return the column of a gear."""
+
+    def shown(row: tuple[str, str, str]) -> str:
+        _, name, part = row
+        form = ".4g" if name == "N_L" else _DIGITS.get(UNITS.get(name, ""), ".3f")
+        return Column(name, name, form).cell({name: sheet_value(name, getattr(flank, part).get(name, math.nan))})
+
+    return Column("\n".join(wrapped(f"{flank.gear} {flank.flank}", GEAR_COLUMN)), shown)
 
 
 def _remarks(sheet: FlankSheet) -> Iterator[str]:
