@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -25,23 +25,8 @@ class MeshModel(StrEnum):
         members[law] = law
 
 
-class ShiftRule(StrEnum):
-    """Source of profile shifts in an industry file: the file, or the centre distance."""
-
-    file = "file"
-    centre_distance = "centre-distance"
-
-
-class DistanceRule(StrEnum):
-    """Source of centre distances in an industry file: consistent values, the positions of the gears, or the file."""
-
-    agreeing = "agreeing"
-    positions = "positions"
-    file = "file"
-
-
 ShiftsOption = Annotated[
-    ShiftRule,
+    Literal["file", "centre-distance"],
     typer.Option(
         "--shifts",
         metavar="RULE",
@@ -50,7 +35,7 @@ ShiftsOption = Annotated[
     ),
 ]
 DistancesOption = Annotated[
-    DistanceRule,
+    Literal["agreeing", "positions", "file"],
     typer.Option(
         "--distances",
         metavar="RULE",

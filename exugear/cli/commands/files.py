@@ -64,15 +64,15 @@ def import_(
         Path | None,
         typer.Option("--out", metavar="FOLDER", help="Folder for gearbox.toml. (default: file name without extension)"),
     ] = None,
-    shifts: options.ShiftsOption = options.ShiftRule.file,
-    distances: options.DistancesOption = options.DistanceRule.agreeing,
+    shifts: options.ShiftsOption = "file",
+    distances: options.DistancesOption = "agreeing",
     as_json: options.JsonOption = False,
 ) -> None:
     """Convert a REXS file (1.0 to 2.0) to a gearbox file. Each value has its source; assumptions are marked."""
     from exugear.cli.tasks.rexs import import_rexs
     from exugear.exchange.rexs.to_case.notes import Rules
 
-    import_rexs(file, out, Rules(shifts.value, distances.value), as_json)
+    import_rexs(file, out, Rules(shifts, distances), as_json)
 
 
 def schema(
@@ -154,8 +154,8 @@ def export(
     ] = None,
     out: options.OutOption = None,
     allow_dir: options.FilesBelowOption = None,
-    shifts: options.ShiftsOption = options.ShiftRule.file,
-    distances: options.DistancesOption = options.DistanceRule.agreeing,
+    shifts: options.ShiftsOption = "file",
+    distances: options.DistancesOption = "agreeing",
     as_json: options.JsonOption = False,
 ) -> None:
     """Write results into a copy of a REXS file. They are REXS attributes where possible, else custom_exugear ones.
@@ -166,4 +166,4 @@ def export(
     from exugear.cli.tasks.rexs import export_rexs
     from exugear.exchange.rexs.to_case.notes import Rules
 
-    export_rexs(case, rexs, to, out, allow_dir, Rules(shifts.value, distances.value), as_json)
+    export_rexs(case, rexs, to, out, allow_dir, Rules(shifts, distances), as_json)

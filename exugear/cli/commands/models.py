@@ -3,22 +3,14 @@
 from __future__ import annotations
 
 import shlex
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
 from exugear.cli import options
 from exugear.cli.console import BadInputError
 from exugear.gearbox.variant import Variant
-
-
-class TableMethod(StrEnum):
-    """Method for tooth deflections: condensed finite elements, or the full nonlinear analysis used as reference."""
-
-    superelement = "superelement"
-    nonlinear = "nonlinear"
 
 
 def ste(
@@ -34,7 +26,7 @@ def ste(
         ),
     ] = None,
     method: Annotated[
-        TableMethod | None,
+        Literal["superelement", "nonlinear"] | None,
         typer.Option(
             metavar="NAME",
             help="superelement: condensed finite elements; nonlinear: reference analysis, about 30 s per position. "
@@ -57,7 +49,7 @@ def ste(
     from exugear.cli.tasks import ste as task
 
     gearbox = read_gearbox(case, allow_dir)
-    if (method or gearbox.ste.method) == TableMethod.nonlinear:
+    if (method or gearbox.ste.method) == "nonlinear":
         if grid:
             raise BadInputError("--grid: the method nonlinear computes the static load only; remove --grid")
         task.references(gearbox, out, mesh or [], positions, as_json)
@@ -110,14 +102,6 @@ def modes(
     task.modes(open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias), as_json)
 
 
-class SteadyMethod(StrEnum):
-    """Methods: transmission error as excitation, time-varying stiffness, or nonlinear models evaluated in time."""
-
-    linear = "linear"
-    parametric = "parametric"
-    nonlinear = "nonlinear"
-
-
 def steady(
     case: options.CaseArgument,
     variant: options.VariantOption = None,
@@ -134,13 +118,13 @@ def steady(
         ),
     ] = None,
     method: Annotated[
-        SteadyMethod,
+        Literal["linear", "parametric", "nonlinear"],
         typer.Option(
             metavar="NAME",
             help="Method. linear: transmission error as excitation; parametric: time-varying stiffness, all meshes "
             "coupled; nonlinear: harmonic balance with contact loss (model table) and bearings of model iso16281.",
         ),
-    ] = SteadyMethod.parametric,
+    ] = "parametric",
     speeds: Annotated[
         str | None,
         typer.Option(
@@ -177,28 +161,7 @@ def steady(
     project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias, load_case)
     if load_case is not None:
         project = project.at_load_case(load_case)
-    task.steady(project, task.settings_of_options(project, method.value, speeds, harmonics, branches), as_json)
-
-
-class Solver(StrEnum):
-    """Solver for time integration: the compiled loop, or Exudyn as the reference model."""
-
-    compiled = "compiled"
-    exudyn = "exudyn"
-
-
-class Integrator(StrEnum):
-    """Integration methods of the compiled solver: multistep with one evaluation per step, or Runge-Kutta with four."""
-
-    adams = "adams"
-    rk4 = "rk4"
-
-
-class MeshRoute(StrEnum):
-    """Form of the mesh forces in Exudyn: one element for all meshes, or a load with a user function on each gear."""
-
-    element = "element"
-    loads = "loads"
+    task.steady(project, task.settings_of_options(project, method, speeds, harmonics, branches), as_json)
 
 
 def run(
@@ -217,17 +180,19 @@ def run(
             help="Compute tables, tooth contact and bearings at the torques of the load case; results in at-NAME.",
         ),
     ] = False,
-    solver: Annotated[Solver, typer.Option(metavar="NAME", help="Solver: compiled or exudyn.")] = Solver.compiled,
+    solver: Annotated[
+        Literal["compiled", "exudyn"], typer.Option(metavar="NAME", help="Solver: compiled or exudyn.")
+    ] = "compiled",
     integrator: Annotated[
-        Integrator | None,
+        Literal["adams", "rk4"] | None,
         typer.Option(metavar="NAME", help="adams or rk4, compiled solver. (default: the cheaper one)"),
     ] = None,
     mesh_route: Annotated[
-        MeshRoute,
+        Literal["element", "loads"],
         typer.Option(
             "--mesh-route", metavar="NAME", help="Mesh forces in Exudyn: element, or loads (slow; bushing only)."
         ),
-    ] = MeshRoute.element,
+    ] = "element",
     duration: Annotated[
         float | None, typer.Option(metavar="S", help="Simulated time, s. (default: load case, or resumed run)")
     ] = None,
@@ -264,8 +229,8 @@ def run(
         project,
         as_json,
         _resuming(context),
-        solver=solver.value,
-        mesh_route=mesh_route.value,
+        solver=solver,
+        mesh_route=mesh_route,
         integrator=integrator,
         band=band,
         duration=duration,
@@ -294,18 +259,12 @@ def _resuming(context: typer.Context) -> str:
     return shlex.join([*words, "--resume"])
 
 
-class Executor(StrEnum):
-    """Executor of the points."""
-
-    processes = "processes"
-    dask = "dask"
-
-
 def study(
     file: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file.", show_default=False)],
     executor: Annotated[
-        Executor, typer.Option(metavar="NAME", help="processes (this machine) or dask (Dask cluster).")
-    ] = Executor.processes,
+        Literal["processes", "dask"],
+        typer.Option(metavar="NAME", help="processes (this machine) or dask (Dask cluster)."),
+    ] = "processes",
     workers: Annotated[
         int | None, typer.Option(min=1, max=1024, help="Number of processes on this machine. (default: all cores)")
     ] = None,
@@ -332,7 +291,7 @@ def study(
     """
     from exugear.cli.tasks import study as task
 
-    opens = task.executor_of_options(executor.value, workers, scheduler)
+    opens = task.executor_of_options(executor, workers, scheduler)
     part = task.shard_of_options(shard, merge)
     task.study(task.read_study(file, allow_dir, scripts), out, opens, part, merge, retry, as_json)
 
