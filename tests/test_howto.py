@@ -26,13 +26,16 @@ START = "exugear new my/gearbox.toml"
 BLOCK = re.compile(
     r"^( *)```(sh|python)\n(.*?)^\1```$((?:\s*<!-- (?:expect|exit|picture): .*? -->)*)", re.MULTILINE | re.DOTALL
 )
-QUICK = ("catalogue_bearings", "damping", "python", "untrusted_files")
+QUICK = ("catalogue_bearings", "python", "untrusted_files")
 LONG = (
+    "damping",
     "drive_with_duty_cycle",
+    "flanks_and_deviations",
     "flexible_bodies",
     "lubricant",
     "operating_range",
     "reference_analysis",
+    "resume_a_run",
     "solids_in_python",
     "studies",
     "te_tables_over_load",

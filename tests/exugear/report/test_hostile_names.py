@@ -92,7 +92,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Any]]:
         def unable(*arguments: Any, **options: Any) -> None:
             raise RenderingError(f"no picture {MARKUP}")
 
-        patch.setattr("exugear.report.pictures.scene.draw_gearbox", unable)
+        patch.setattr("exugear.cli.tasks.view.draw_gearbox", unable)
         ended = [
             exugear("check", case),
             exugear("check", case, "--json"),

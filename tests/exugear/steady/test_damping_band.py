@@ -28,7 +28,7 @@ def sizes_of(data, quantity, line: int) -> np.ndarray:
 
 @pytest.mark.validation
 @pytest.mark.sample
-@pytest.mark.parametrize("method", ["parametric", "linear"])
+@pytest.mark.parametrize("method", ["parametric", pytest.param("linear", marks=pytest.mark.long)])
 def test_peaks_at_both_ends_are_those_of_whole_responses(grc: Gearbox, stiffness: dict, method: str) -> None:
     """Of the ten highest peaks of each quantity: half within 0.5 %, all within 3.5 %."""
     modal = {"modal_percent": 2.0, "modal_band_percent": (1.0, 4.0)}

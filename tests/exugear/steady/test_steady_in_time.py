@@ -241,7 +241,9 @@ def table_solver(grc):
 
 @pytest.mark.validation
 @pytest.mark.sample
-@pytest.mark.parametrize(("speed", "effect", "most"), [(18.0, 5e-3, OFF), (11.0, 0.1, 5e-4)])
+@pytest.mark.parametrize(
+    ("speed", "effect", "most"), [pytest.param(18.0, 5e-3, OFF, marks=pytest.mark.long), (11.0, 0.1, 5e-4)]
+)
 def test_planets_that_bear_unequally_act_back_as_they_pass(table_solver, speed, effect, most):
     """With planets at their mean the lines are off by the effect; with what their passing does they are those of a run.
 
