@@ -37,7 +37,7 @@ def page(tmp_path_factory: pytest.TempPathFactory, stiffness: dict[str, np.ndarr
     return write_mode_page(modes.assembly, modes.shapes[:, places], rows, path, heading="GRC", first=1)
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def desk(browser: Any, page: Path) -> Iterator[View]:
     view = opened(browser, "desk")
     view.open(page)
@@ -78,13 +78,6 @@ def test_rest_position_and_views_change_the_picture(desk: View) -> None:
     assert desk.soon(lambda: desk.pixels("#view-3d") == moved)
 
 
-def test_nothing_scrolls_sideways_on_a_phone(browser: Any, page: Path) -> None:
-    view = opened(browser, "phone")
-    view.open(page)
-    assert view.page.evaluate("document.documentElement.scrollWidth - window.innerWidth") <= 0
-    view.page.context.close()
-
-
 RECORDED = """window.tags = []; const draw = CanvasRenderingContext2D.prototype.strokeRect;
 CanvasRenderingContext2D.prototype.strokeRect = function (...box) { window.tags.push(box); draw.apply(this, box); };"""
 COUNT = """([left, top, right, bottom]) => { const c = document.querySelector('#marks'), w = c.width, h = c.height;
@@ -93,7 +86,7 @@ let n = 0; for (let i = 3; i < p.length; i += 4) if (p[i] > 128) n++; return n; 
 AXES, SCALE, NAMES = (0.0, 0.72, 0.35, 1.0), (0.65, 0.85, 1.0, 1.0), (0.1, 0.05, 1.0, 0.65)
 
 
-@pytest.fixture(params=SIZES)
+@pytest.fixture(scope="module", params=SIZES)
 def marked(browser: Any, page: Path, request: pytest.FixtureRequest) -> Iterator[View]:
     view = opened(browser, request.param)
     view.page.add_init_script(RECORDED)
@@ -103,11 +96,17 @@ def marked(browser: Any, page: Path, request: pytest.FixtureRequest) -> Iterator
     view.page.context.close()
 
 
+def test_nothing_scrolls_sideways(marked: View) -> None:
+    assert marked.page.evaluate("document.documentElement.scrollWidth - window.innerWidth") <= 0
+
+
 def test_axes_scale_and_names_are_drawn_and_names_can_be_hidden(marked: View) -> None:
     assert marked.soon(lambda: all(marked.page.evaluate(COUNT, part) > 30 for part in (AXES, SCALE, NAMES)))
     marked.page.locator("#labels").uncheck()
     assert marked.soon(lambda: marked.page.evaluate(COUNT, NAMES) == 0)
     assert all(marked.page.evaluate(COUNT, part) > 30 for part in (AXES, SCALE))
+    marked.page.locator("#labels").check()
+    assert marked.soon(lambda: marked.page.evaluate(COUNT, NAMES) > 30)
 
 
 def test_names_do_not_cover_each_other(marked: View) -> None:

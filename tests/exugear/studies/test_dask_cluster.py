@@ -64,6 +64,7 @@ def on_cluster(address, content, folder):
 
 
 @pytest.mark.validation
+@pytest.mark.long
 def test_a_cluster_gives_the_same_bits_even_if_a_worker_is_killed(cluster, tmp_path):
     address, workers = cluster
     here = run_study(small_study(tmp_path), tmp_path / "here", processes(1))

@@ -74,7 +74,7 @@ def test_every_pair_of_the_grc_shows_its_curve(grc: Gearbox) -> None:
 
 @pytest.mark.validation
 @pytest.mark.sample
-@pytest.mark.parametrize("pair", ["sun_planet", "high_speed"])
+@pytest.mark.parametrize("pair", [pytest.param("sun_planet", marks=pytest.mark.long), "high_speed"])
 def test_moment_of_misalignment_is_the_loads_lever(grc: Gearbox, pair: str) -> None:
     """The potential's derivative by misalignment against F times the place of the load in the finite-element contact.
 

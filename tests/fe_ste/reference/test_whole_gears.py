@@ -50,6 +50,7 @@ def test_condensed_teeth_do_what_meshed_ones_do(pair):
 
 
 @pytest.mark.validation
+@pytest.mark.long
 def test_condensed_teeth_turn_with_the_hub():
     """Finite deformation: they are linear in what they take up beyond the rigid turn of their hub, which is all."""
     gears = placed_gears(PAIR, UNIFORM, 3, 0.2)
