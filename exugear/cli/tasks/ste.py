@@ -63,8 +63,8 @@ def ste(gearbox: Gearbox, out: Path | None, names: list[str], positions: int | N
     with time_noted(folder, "tables of transmission error"):
         tables = project.computed(requests)
     with time_noted(folder, "pictures of the tables"):
-        beside = stored_tables(gearbox, folder, positions)
-        with _curves_beside({**beside, **tables}, folder, requests) as curves:
+        stored = stored_tables(gearbox, folder, positions)
+        with _curves_beside({**stored, **tables}, folder, requests) as curves:
             contacts = _draw_contacts(requests, tables, folder)
         pictures = curves.result() + contacts
     _print_misalignment(project)

@@ -106,8 +106,10 @@ def place_on_flank(contact: PairContact, path: float, axial: float, labels: Mapp
 
 
 def edge_in_words(contact: PairContact, labels: Mapping[str, str]) -> str:
-    """Say at which tip the edge pressure is highest, such as "tip of planet, +z end"."""
+    """Say at which tip the edge pressure is highest, such as "tip of planet, +z end"; a dash if no load lies there."""
     path, axial = contact.actual.edge_place
+    if np.isnan(path):
+        return "–"
     gear = contact.pair.pinion if path == contact.actual.path[-1] else contact.pair.gear
     return f"tip of {labels.get(gear.name, gear.name)}, {_end_of_face(contact, axial)}"
 

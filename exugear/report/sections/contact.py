@@ -61,7 +61,7 @@ def _row(material: ReportData, own: PairContact) -> dict[str, object]:
         "pressure as held / MPa": _cell(1e-6 * own.actual.highest[0]),
         "highest pressure at": place_on_flank(own, *own.actual.highest[1:], labels),
         "tip edge pressure / MPa": _cell(1e-6 * edge) if edge > 0.0 else Cell("–"),
-        "highest tip edge pressure at": edge_in_words(own, labels) if edge > 0.0 else "–",
+        "highest tip edge pressure at": edge_in_words(own, labels),
     }
     if material.ratings.sheet is not None:
         required = rating_of(material.context.gearbox)

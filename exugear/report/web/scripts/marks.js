@@ -89,7 +89,7 @@ function drawNames(drawing, stage, width, height) {
     placed.push(tag);
     drawLine(drawing, [x, y, Math.max(tag.x, Math.min(x, tag.x + tag.width)), tag.y + HEIGHT / 2]);
   }
-  // All tags stand over all lines.
+  // Tags are drawn last, so that no line crosses a name.
   for (const tag of placed) {
     drawing.fillStyle = pageColour("--panel");
     drawing.fillRect(tag.x, tag.y, tag.width, HEIGHT);

@@ -73,6 +73,12 @@ def test_the_tip_edge_is_of_gear_1_at_the_end_of_the_path_and_of_gear_2_at_its_s
         assert edge_in_words(seen, {"wheel": "big wheel"}) == f"tip of {name}, +z end"
 
 
+def test_without_a_load_at_tip_edges_no_tip_is_named(loaded_below: FlankPressure) -> None:
+    """A pressure at edges may come from cells whose load lies on the path."""
+    edge = replace(loaded_below, edge_pressure=3e9)
+    assert edge_in_words(contact(edge), {}) == edge_in_words(contact(_seen_by(edge, -1)), {}) == "–"
+
+
 def test_safety_factors_are_the_smallest_of_both_gears_and_finite_elements_count() -> None:
     def flank(gear: str, standard: float, finite_elements: dict[str, float]) -> FlankSheet:
         return FlankSheet(gear, "mesh", "+", 0, {"S_H": standard, "S_F": 2.0 * standard}, finite_elements, {}, ())
