@@ -92,7 +92,7 @@ help:
 	@echo "make validate    long comparisons with reference results"
 	@echo "make validate-long  the longest comparisons, before a release; recorded in docs/validation/index.md"
 	@echo "make benchmarks  run times, into benchmarks/results.md, README and docs"
-	@echo "make check       ruff, mypy and the wording of texts"
+	@echo "make check       ruff and mypy"
 	@echo "make check-web   lint and type check of the report scripts, with a separate node"
 	@echo "make vendor-web  update the libraries of the report from npm, versions of web/package.json"
 	@echo "make docs        build the documentation site and run its examples, into $(SITE)"
@@ -149,7 +149,6 @@ benchmarks: $(INSTALLED)
 check: $(INSTALLED)
 	$(RUN)/ruff check .
 	$(RUN)/mypy
-	$(RUN)/python docs/tools/check_wording.py
 
 # Node comes as a wheel and stays out of $(VENV): nothing but these two targets needs it.
 $(WEB_VENV)/installed: web/package.json web/package-lock.json

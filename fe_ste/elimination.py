@@ -57,7 +57,7 @@ class Factorisation(ABC):
     """
 
     name: Backend
-    """Str. The library at work: "pardiso" or "superlu"."""
+    """The library at work: "pardiso" or "superlu"."""
 
     def __init__(self, unknowns: int) -> None:
         self.unknowns = unknowns
@@ -68,11 +68,11 @@ class Factorisation(ABC):
 
         Parameters
         ----------
-        rhs : (n,) (n, k), (n, k) right-hand sides, one a column
+        rhs : (n,) or (n, k), one right-hand side a column
 
         Returns
         -------
-        (n,) (n, k) the solutions, as a dense array of the shape of `rhs`
+        the solutions, as a dense array of the shape of `rhs`
 
         Raises
         ------
@@ -314,9 +314,9 @@ def add_product(target: Floats, left: Floats, right: Floats, factor: float = 1.0
     if min(rows, columns, inner) == 0:
         return
     scale = ctypes.byref(ctypes.c_double(factor))
-    byref = ctypes.byref(ctypes.c_double(1.0))
+    unit = ctypes.byref(ctypes.c_double(1.0))
     sizes = _integer(rows), _integer(columns), _integer(inner)
-    _function("blas", "dgemm")(b"N", b"T", *sizes, scale, *_place(left), *_place(right), byref, *_place(target))
+    _function("blas", "dgemm")(b"N", b"T", *sizes, scale, *_place(left), *_place(right), unit, *_place(target))
 
 
 def subtract_square(target: Floats, left: Floats) -> None:
@@ -325,10 +325,8 @@ def subtract_square(target: Floats, left: Floats) -> None:
     if min(rows, inner) == 0:
         return
     minus = ctypes.byref(ctypes.c_double(-1.0))
-    byref = ctypes.byref(ctypes.c_double(1.0))
-    _function("blas", "dsyrk")(
-        b"L", b"N", _integer(rows), _integer(inner), minus, *_place(left), byref, *_place(target)
-    )
+    unit = ctypes.byref(ctypes.c_double(1.0))
+    _function("blas", "dsyrk")(b"L", b"N", _integer(rows), _integer(inner), minus, *_place(left), unit, *_place(target))
 
 
 def factorise_lower(matrix: Floats) -> None:
@@ -345,9 +343,9 @@ def _divide(rows: Floats, factor: Floats, transposed: bytes) -> None:
     """Multiply rows from the right by the inverse of a lower triangle, or of its transpose, in place."""
     if min(rows.shape) == 0:
         return
-    byref = ctypes.byref(ctypes.c_double(1.0))
+    unit = ctypes.byref(ctypes.c_double(1.0))
     sizes = _integer(rows.shape[0]), _integer(rows.shape[1])
-    _function("blas", "dtrsm")(b"R", b"L", transposed, b"N", *sizes, byref, *_place(factor), *_place(rows))
+    _function("blas", "dtrsm")(b"R", b"L", transposed, b"N", *sizes, unit, *_place(factor), *_place(rows))
 
 
 def eliminate(matrix: Floats, count: int) -> None:

@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 from exugear.gearbox import body_parts, checks, gear_parts
-from exugear.gearbox import body_parts as support_parts
 from exugear.gearbox.named_files import NOTHING_MORE, Permissions
 from exugear.gearbox.parts import (
     Bearing,
@@ -295,32 +294,32 @@ class Gearbox(ReprMixin):
     @cached_property
     def joints(self) -> tuple[Joint, ...]:
         """Ideal joints of the variant `rigid`."""
-        return support_parts.joints(self._origin, self.named_bodies)
+        return body_parts.joints(self._origin, self.named_bodies)
 
     @cached_property
     def bearings(self) -> tuple[Bearing, ...]:
         """Compliant supports of the variants `bushing` and `flexible`."""
-        return support_parts.bearings(self._origin, self.named_bodies)
+        return body_parts.bearings(self._origin, self.named_bodies)
 
     @cached_property
     def unknown_bearings(self) -> dict[str, str]:
         """Designations of bearings without other data, by name; variants with bearings require these data."""
-        return support_parts.unknown_bearings(self._origin)
+        return body_parts.unknown_bearings(self._origin)
 
     @cached_property
     def mounts(self) -> tuple[Bearing, ...]:
         """Supports of the gearbox on the ground, which are active if a fixed body is flexible."""
-        return support_parts.mounts(self._origin)
+        return body_parts.mounts(self._origin)
 
     @cached_property
     def forces(self) -> tuple[PointForce, ...]:
         """Constant forces and moments on bodies."""
-        return support_parts.point_forces(self._origin, self.named_bodies)
+        return body_parts.point_forces(self._origin, self.named_bodies)
 
     @cached_property
     def couplings(self) -> tuple[Coupling, ...]:
         """Torsional springs between rotating bodies."""
-        return support_parts.couplings(self._origin, self.spinning, [bearing.name for bearing in self.bearings])
+        return body_parts.couplings(self._origin, self.spinning, [bearing.name for bearing in self.bearings])
 
     # -- gears -------------------------------------------------------------------------------------------
 

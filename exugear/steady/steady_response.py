@@ -261,10 +261,8 @@ class SteadyResponse(ReprMixin):
         place, mirrored = self.lines.find(np.array(line, dtype=np.int64))
         if place < 0:
             raise SteadyError(f"no line {line}; single bases go up to {self.settings.harmonics}")
-        index = self.solved.amplitude[:, int(place), names.index(signal)].astype(np.complex128)
-        if mirrored:
-            return np.conj(index)
-        return index
+        values = self.solved.amplitude[:, int(place), names.index(signal)].astype(np.complex128)
+        return np.conj(values) if mirrored else values
 
 
 CHECKED, MORE = 10, 1.5

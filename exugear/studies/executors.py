@@ -212,7 +212,7 @@ class Task:
     folder: Path
     """Folder of the study."""
     parameters: Mapping[str, str] = field(default_factory=dict)
-    """Mapping of path to str. Names of the parameters that set paths in the gearbox file."""
+    """Names of the parameters that set values in the gearbox file, by path."""
 
 
 @dataclass(frozen=True)

@@ -251,7 +251,7 @@ class PointSettings:
     duration: float | None = None
     """Duration of runs, s; by default that of the load case."""
     solver: Solver | None = None
-    """Str, optional. Solver of runs."""
+    """Solver of runs."""
 
 
 @dataclass

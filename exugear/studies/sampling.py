@@ -552,9 +552,9 @@ class Tolerances:
     axes: Mapping[str, Axis]
     """By name, coordinates over the draws."""
     draws: tuple[Mapping[str, float], ...]
-    """Tuple of mapping of path to float. Values before scaling or shifting."""
+    """Values by path before scaling or shifting."""
     acting: Mapping[str, ParameterSection]
-    """Mapping of path to ParameterSection. Parameter with the action of a value at a path."""
+    """Parameter with the action of a value, by path."""
 
     def produced(self, gearbox: Gearbox, changes: Mapping[str, Any]) -> list[dict[str, Any]]:
         """Return the values by path of each draw: a tolerance shifts or scales the value of the point.

@@ -72,7 +72,7 @@ class Assembly(ReprMixin):
     bodies: tuple[Body, ...]
     """Moving bodies in the order of their coordinates, elastic fixed ones among them."""
     coordinates: Mapping[str, tuple[int, ...]]
-    """The six state indices of each body by name, -1 where there is none; of an elastic body those of. its main
+    """The six state indices of each body by name, -1 where there is none; of a flexible body those of its main
     seat, and those of each seat under `exugear.gearbox.parts.seat_key`."""
     size: int
     """Number of coordinates."""
@@ -96,12 +96,12 @@ class Assembly(ReprMixin):
     motions: Floats
     """(size, n) motions that are free; the identity, but for the law `rigid` the rolling ones."""
     rows_stiffness: Floats
-    """(supports, 6, 6) stiffness of the rows of catalogue bearings at their static load, for methods: that begin
-    with linear ones; zero for other supports."""
+    """(supports, 6, 6) stiffness of the rows of catalogue bearings at their static load, for methods that begin
+    with linear bearings; zero for other supports."""
     operating_points: tuple[OperatingPoint | None, ...] = ()
     """Of each support, None for those that are no catalogue bearings; empty where there are none."""
     connectors_at_rest: ConnectorArrays | None = None
-    """Connectors of static states, in which all catalogue bearings follow their rows; None where. they are those of
+    """Connectors of static states, in which all catalogue bearings follow their rows; None where they are those of
     motion."""
     contacts: StaticContacts = StaticContacts()
     """Contact of meshes at the static misalignment, where it was solved."""

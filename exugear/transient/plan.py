@@ -186,7 +186,7 @@ class RunPlan:
     solver: str
     """``compiled`` or ``exudyn``."""
     mesh_route: MeshRoute = "element"
-    """Str. How meshes act in Exudyn: ``element`` or ``loads``."""
+    """How meshes act in Exudyn: ``element`` or ``loads``."""
 
     @property
     def step(self) -> float:

@@ -102,8 +102,8 @@ def summarise(
             for pull in (() if law.loses_contact else pulls(data))
         ],
         "not_converged": [
-            {"speed_rpm": load["speed"] / RPM, "reason": load["reason"]}
-            for load in json.loads(data.attrs["not_converged"])
+            {"speed_rpm": point["speed"] / RPM, "reason": point["reason"]}
+            for point in json.loads(data.attrs["not_converged"])
         ],
         "unstable_points": int((data["growth"] > 0.0).sum()),
         "largest_energy_error": float(abs(data["energy_error"]).max()),
@@ -128,8 +128,8 @@ def summarise(
         ],
         "file": str(project.steady_path(settings)),
         "neglected_shuttling": [
-            {"pair": load.pair, "load_centroid_m": load.amplitude, "over_transmission_error": load.over_error}
-            for load in shuttling
+            {"pair": pair.pair, "load_centroid_m": pair.amplitude, "over_transmission_error": pair.over_error}
+            for pair in shuttling
             if excited
         ],
         "bearings_outside_linear_range": [

@@ -102,7 +102,7 @@ class Context:
     assemblies: dict[Choice, Assembly] = field(default_factory=dict)
     """Assembled models by model settings."""
     stiffnesses: dict[str, dict[str, Floats | MeshCurve | SteSurface]] = field(default_factory=dict)
-    """Dict of mesh model to mesh stiffness. Mesh stiffness read so far."""
+    """Mesh stiffness read so far, by mesh model."""
 
     def stiffness(self, law: str) -> dict[str, Floats | MeshCurve | SteSurface]:
         """Return the mesh stiffness of a mesh model from the tables of the folder; it is read once."""

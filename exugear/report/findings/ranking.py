@@ -326,7 +326,7 @@ def _resonance(
 
 def _accelerating_parts(data: xr.Dataset) -> str:
     """Return the parts whose accelerations are given, from the seat data of the file."""
-    carried = {bool(load) for load in json.loads(str(data.attrs["carried_seats"])).values()}
+    carried = {bool(carrier) for carrier in json.loads(str(data.attrs["carried_seats"])).values()}
     if carried <= {False}:
         return SHAFTS
     if carried == {True}:
@@ -465,5 +465,5 @@ def response_spectra(
     parts = response["amplitude"].to_numpy()[places, 1:][..., [names.index(name) for name in signals]]
     amplitude = np.sqrt((parts.astype(np.float64) ** 2).sum(axis=-1))
     orders = response["order"].to_numpy()[1:]
-    unknown = [abs(float(load["speed"])) for load in json.loads(response.attrs.get("not_converged", "[]"))]
+    unknown = [abs(float(point["speed"])) for point in json.loads(response.attrs.get("not_converged", "[]"))]
     return line_spectra(speed, orders, amplitude, highest, unknown=unknown, reference=reference, unit=unit)

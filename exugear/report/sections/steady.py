@@ -112,8 +112,8 @@ def _remarks(data: xr.Dataset) -> list[dict[str, object]]:
     speeds = data["speed"].to_numpy()
     said = [(abs(float(speed)), str(words)) for speed, words in zip(speeds, data["remark"].to_numpy(), strict=True)]
     lost = [
-        (abs(float(load["speed"])), f"not converged: {load['reason']}")
-        for load in json.loads(str(data.attrs["not_converged"]))
+        (abs(float(point["speed"])), f"not converged: {point['reason']}")
+        for point in json.loads(str(data.attrs["not_converged"]))
     ]
     entries = sorted([own for own in said if own[1]] + lost)
     return [{"speed / rpm": f"{speed / RPM:.2f}", "remark": words} for speed, words in entries]
@@ -141,17 +141,17 @@ def _contributions_table(material: ReportData, data: xr.Dataset, name: str) -> T
     bases = tuple(str(name) for name in data["base"].to_numpy())
     index = data["index"].to_numpy()
     rows = []
-    for load in json.loads(data.attrs["contributions"]):
-        line = load["line"]
-        speed = abs(float(load["speed"]))
+    for peak in json.loads(data.attrs["contributions"]):
+        line = peak["line"]
+        speed = abs(float(peak["speed"]))
         rows.append(
             {
                 "order": labelled(line_name(tuple(int(n) for n in index[line]), bases)),
                 "speed / rpm": f"{speed / RPM:.2f}",
-                "excited by": labelled(_shares(load["meshes"].items())),
-                "responding modes": _shares((f"{frequency:.1f} Hz", share) for frequency, share in load["modes"]),
-                "sensitivity to stiffness of": labelled(_slopes_of(load["supports"])),
-                "sensitivity to inertia of": labelled(_slopes_of(load["bodies"])),
+                "excited by": labelled(_shares(peak["meshes"].items())),
+                "responding modes": _shares((f"{frequency:.1f} Hz", share) for frequency, share in peak["modes"]),
+                "sensitivity to stiffness of": labelled(_slopes_of(peak["supports"])),
+                "sensitivity to inertia of": labelled(_slopes_of(peak["bodies"])),
             }
         )
     texts = ("order", "excited by", "responding modes", "sensitivity to stiffness of", "sensitivity to inertia of")

@@ -95,7 +95,7 @@ class DrawnMode:
     motions: Complexes
     """(bodies, 6) rigid-body motion of each body; zero for a body with a field."""
     fields: dict[int, Complexes]
-    """Mapping of body index to (p, 3) array. Displacement of the points of flexible bodies."""
+    """(p, 3) displacement of the points of flexible bodies, by the index of the body."""
 
 
 def drawn_mode(

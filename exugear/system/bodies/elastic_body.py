@@ -173,7 +173,7 @@ class FloatingMotion:
 
 
 class FloatingCoordinates:
-    """Return the maps from the 7 + k coordinates of a floating frame to the n = 6 + k of the reduced body, and back.
+    """Maps from the 7 + k coordinates of a floating frame to the n = 6 + k of the reduced body, and back.
 
     A floating frame's coordinates are the displacement of its centre, the change of its Euler parameters from
     (1, 0, 0, 0), and the modal coordinates.

@@ -109,7 +109,7 @@ class Scratch(NamedTuple):
     cubic: Floats
     """(9, 8) the surface's derivatives in the order of `ORDERS`, over one load piece, filled up."""
     law: Floats
-    """(7,) force (N), tangent stiffness (N/m), potential (J), its derivatives by centre distance (N), by: misalignment
+    """(7,) force (N), tangent stiffness (N/m), potential (J), its derivatives by centre distance (N), misalignment
     (N m) and by pmc (J), `LEFT_TABLE` where an axis was left, `GUESSED` near states that have not converged."""
 
 

@@ -43,12 +43,12 @@ class ContactCycle:
     """What of a contact changes over the mesh cycle, at equal steps from its beginning."""
 
     deflection: Samples
-    """Tuple of float. Static transmission error, m."""
+    """Static transmission error, m."""
     tangent_stiffness: Samples
-    """Tuple of float. N/m."""
+    """N/m."""
     load_centroid: Samples
     tangent_load_centroid: Samples
-    """Tuple of float. Of the load, and of what a little more deflection adds to it, m."""
+    """Of the load, and of the load that a small additional deflection adds, m."""
 
 
 @dataclass(frozen=True)

@@ -120,8 +120,8 @@ class Law:
     form: ClassVar[int]
     """Number of the law's compiled form in `exugear.system.tooth_mesh.laws.mesh_forces`."""
     tilts: ClassVar[bool] = True
-    """Whether teeth resist misalignment by the state of their contact. (`system.tooth_mesh.contact_state`); a law
-    that does not has no moment, or one of its own."""
+    """Whether teeth resist misalignment by the state of their contact
+    (`exugear.system.tooth_mesh.contact_state`); a law that does not has no moment, or one of its own."""
 
     def read(self, gearbox: Gearbox, pair: str, directory: Path) -> Floats | MeshCurve | SteSurface:
         """Read or compute the inputs of the model for a pair.

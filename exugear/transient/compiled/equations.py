@@ -5,8 +5,6 @@ every sine is taken once per evaluation, constant entries that are zero are left
 body before they are turned into generalized ones. Bodies without a coordinate point to one that stays zero, so that the
 loops need no exceptions.
 
-Machine code is kept by `fe_ste.tools.compilation`.
-
 Each place has eight numbers x y z 0 a b spin 0 (see `exugear.system.kernels.coordinates`) and their rates behind, two
 vectors of four each, as the processor takes them; forces likewise. Machine code is kept by `fe_ste.tools.compilation`.
 """

@@ -60,7 +60,7 @@ class StepHistory(NamedTuple):
     """Accelerations that a run has passed, as the compiled loop keeps them."""
 
     accelerations: Floats
-    """(rows, s) the latest ones, one row after the other, round and round; s is the size, filled up with: zeros to a
+    """(rows, s) the latest ones, one row after the other, round and round; s is the size, filled up with zeros to a
     multiple of eight, as the loop takes them."""
     sums: Floats
     """(2, s) memory of a step."""

@@ -129,7 +129,7 @@ class Pairs(NamedTuple):
     twisting: Integers
     """(p,) 1 where the angle about z acts, else 0."""
     data: Floats
-    """(c, 72) stiffness by column, rows padded to x y z 0 a b c 0, and padded alike the load without displacement;:
+    """(c, 72) stiffness by column, rows padded to x y z 0 a b c 0, and padded alike the load without displacement;
     then attachment in the first body's axes, damping over stiffness (s), attachment in the second one's axes, 1
     where that is off its z axis, the second attachment and the second node against the first at zero angles, 1 where
     damping has a matrix of its own."""
