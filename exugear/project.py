@@ -544,20 +544,31 @@ class Project(ReprMixin):
         exudyn = simulate(self.gearbox, self.choice, self.stiffness(), beside, **given)
         return compare_solvers(self.run_directory / FINAL_NAME, exudyn.path)
 
-    def design_changes(self, progress: Callable[[int, int, str], None] | None = None) -> DesignStudy | None:
-        """Compute what design changes do to the first resonance in the operating range, each with the full check.
+    def design_changes(
+        self,
+        progress: Callable[[int, int, str], None] | None = None,
+        *,
+        resonance: int = 1,
+        quantity: str | None = None,
+        loads: Sequence[str] = (),
+    ) -> DesignStudy | None:
+        """Compute what design changes do to a resonance in the operating range, each with the full check.
 
-        Tables, static state and steady-state response of each changed gearbox are stored in a subfolder; a repeated or
-        resumed study reads those that exist. None without a resonance in the range.
+        Tables, static state, steady-state response and rating of each changed gearbox are stored in a subfolder; a
+        repeated or resumed study reads those that exist. None without such a resonance in the range.
 
         Parameters
         ----------
         progress : called with the number of finished changes, their total, and the description of the next one
+        resonance : rank of the resonance
+        quantity : ``transmission_error``, ``bearing_force`` or ``acceleration``, which decides; by default as
+            `exugear steady` ranks
+        loads : names of load cases, or percentages of the static load such as ``50%``; by default the static load
         """
         from exugear.report.design_study import study_design_changes  # not needed by a run
 
         with time_noted(self.folder, f"design changes, {self.choice.variant}"):
-            return study_design_changes(self, progress)
+            return study_design_changes(self, progress, resonance=resonance, quantity=quantity, loads=loads)
 
     def report(self, near: float | None = None, tell: Callable[[str], None] | None = None) -> Report:
         """Write the report of all results in the folder: see `exugear.report.writer.write_report`."""

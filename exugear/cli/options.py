@@ -95,6 +95,16 @@ ScriptsOption = Annotated[
         show_envvar=False,
     ),
 ]
+QuantityOption = Annotated[
+    Literal["transmission_error", "bearing_force", "acceleration"] | None,
+    typer.Option(
+        "--quantity",
+        metavar="NAME",
+        help="Quantity that ranks the resonances: transmission_error, bearing_force or acceleration. (default: gearbox "
+        "file)",
+        show_default=False,
+    ),
+]
 InertiasOption = Annotated[
     str | None, typer.Option("--inertias", metavar="SET", help="Inertia set. (default: gearbox file)")
 ]

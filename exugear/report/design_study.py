@@ -7,7 +7,7 @@ the results, so that a stopped study resumes, and a repeated one reads its resul
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, Self
 
@@ -15,21 +15,25 @@ import numpy as np
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.load_cases import gearbox_at_load
 from exugear.gearbox.reading import GearboxFileError
 from exugear.report.findings.design_changes import (
     ChangeResult,
-    DesignChange,
     DesignStudy,
     effects_of,
+    least_favourable,
     multiples_of,
+    objection_to,
     ordered,
     peaks_of,
     price_of,
-    propose_changes,
     settings_of_study,
     write_design_study,
 )
+from exugear.report.findings.margins import Margin, margins_in_words, margins_of, shortfalls_of
+from exugear.report.findings.proposals import ASSUMPTION, DesignChange, propose_changes
 from exugear.report.findings.ranking import Resonance, ranking_of
+from exugear.report.findings.words import QUANTITIES
 from exugear.results.folder import DESIGN_CHANGES_FILE
 from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.settings import SteadySettings
@@ -43,14 +47,19 @@ from fe_ste.tools.files import write_file
 if TYPE_CHECKING:
     import xarray as xr
 
-    from exugear.system.bearings.duty import BearingLoadState
     from exugear.system.modes import Modes
+    from exugear.system.system import Assembly
     from fe_ste.transmission_error.table import MeshTable
 
 FOLDER = "design-changes"
 """Subfolder of the results with one folder for each changed gearbox."""
-BEARINGS = 2
-"""Number of bearings with the largest strain energy that changes are proposed for."""
+LEAST_ENERGY = 0.1
+"""Fraction of the strain energy from which changes of a bearing are proposed."""
+STATIC = "static load"
+"""Load by default."""
+MOST_LOAD = 3.0
+"""Largest load over the static load."""
+NOT_RATED = "its life cannot be computed (`exugear life`)"
 _REFUSALS = (GearboxFileError, GeometryError, BearingError, BalanceError, MeshError, SteadyError)
 """Errors that say that a change cannot be made."""
 
@@ -82,60 +91,98 @@ class ComputedProject(Protocol):
     def modes(self) -> Modes:
         """Return the modes."""
 
-    def bearings(self) -> tuple[BearingLoadState, ...]:
-        """Return the loads and lives of the bearings at the static load."""
+    def assembly(self) -> Assembly:
+        """Return the equations of motion."""
+
+    def life(self) -> xr.Dataset:
+        """Rate gears and bearings under the load spectrum."""
 
     def tables_at_work(self) -> dict[str, MeshTable]:
         """Return the transmission error tables that the mesh model reads."""
 
 
 def study_design_changes(
-    project: ComputedProject, progress: Callable[[int, int, str], None] | None = None
+    project: ComputedProject,
+    progress: Callable[[int, int, str], None] | None = None,
+    *,
+    resonance: int = 1,
+    quantity: str | None = None,
+    loads: Sequence[str] = (),
 ) -> DesignStudy | None:
-    """Compute what proposed design changes do to the first resonance in the operating range.
+    """Compute what proposed design changes do to a resonance in the operating range.
 
     Parameters
     ----------
     progress : called with the number of finished changes, their total, and the description of the next one
+    resonance : rank of the resonance at the first load
+    quantity : quantity that decides, as in `exugear.report.findings.ranking.DECIDING`; by default that of the file
+    loads : names of load cases, or percentages of the static load such as ``50%``; by default the static load
 
     Returns
     -------
-    None if the response has no resonances in the range
+    None if the response has fewer resonances in the range
+
+    Raises
+    ------
+    GearboxFileError
+        A load is not known.
     """
     settings = settings_of_study(project.gearbox)
+    wanted = quantity or project.gearbox.case.report.quantity
+    points = loads or (STATIC,)
     # The response of the unchanged gearbox has a folder, too: that of the project may be over other speeds.
-    data = _project_with(project, project.gearbox, "unchanged").steady(settings)
-    ranking = ranking_of(data)
-    if not ranking.resonances:
+    unchanged = {load: _at_load(project, project.gearbox, "unchanged", load) for load in points}
+    responses = {load: own.steady(settings) for load, own in unchanged.items()}
+    data = responses[points[0]]
+    ranking = ranking_of(data, wanted=wanted)
+    if len(ranking.resonances) < resonance:
         return None
-    resonance = ranking.resonances[0]
+    chosen = ranking.resonances[resonance - 1]
     families = {mesh.family for mesh in project.gearbox.meshes}
-    multiples = multiples_of(data, resonance.order, families)
-    before = peaks_of(data, multiples, families, resonance.frequency, ranking.speeds)
+    multiples = multiples_of(data, chosen.order, families)
+
+    def peaks(response: xr.Dataset) -> dict[str, tuple[float, float]]:
+        return peaks_of(response, multiples, families, chosen.frequency, ranking.speeds)
+
+    before = {load: peaks(response) for load, response in responses.items()}
     exciting = {family: count for base, count in multiples.items() for family in base.split(", ")}
-    changes = _proposed(project, exciting, resonance)
-    life = _shortest_life(project)
+    rated = _margins(_project_with(project, project.gearbox, "unchanged"))
+    labels = {name: label.column for name, label in QUANTITIES.items()}
+    changes = _proposed(project, exciting, chosen)
     results = []
     for number, change in enumerate(changes):
         if progress is not None:
             progress(number, len(changes), change.words)
+        if change.reason:
+            results.append(ChangeResult(change, {}, refusal=change.reason))
+            continue
         try:
-            changed = _changed_project(project, change)
-            response = changed.steady(settings)
-            after = peaks_of(response, multiples, families, resonance.frequency, ranking.speeds)
-            price = price_of(project.gearbox, changed.gearbox, (life, _shortest_life(changed)))
-            results.append(ChangeResult(change, effects_of(before, after), price))
+            gearbox = _changed_gearbox(project, change)
+            after = {load: peaks(_at_load(project, gearbox, change.name, load).steady(settings)) for load in points}
+            effects = least_favourable([effects_of(before[load], after[load]) for load in points])
+            costs = [price_of(project.gearbox, gearbox, nominal=rated is None)]
+            objection = objection_to(effects, ranking.quantity, labels)
+            # The rating takes as long as the response: only a change that is worth it is rated.
+            if not objection and rated is not None and change.group != ASSUMPTION:
+                margins, failed = _margins(_project_with(project, gearbox, change.name)) or ({}, [NOT_RATED])
+                costs.append(margins_in_words(rated[0], margins))
+                objection = f"fails a requirement: {failed[0]}" if failed else ""
+            results.append(ChangeResult(change, effects, "; ".join(filter(None, costs)), objection))
         except _REFUSALS as error:
             reason = str(error).removeprefix(f"{project.gearbox.source}: ").split("\n")[0]
-            results.append(ChangeResult(change, {}, "", reason))
+            results.append(ChangeResult(change, {}, refusal=reason))
     study = DesignStudy(
         {key: str(data.attrs[key]) for key in ("variant", "mesh_model", "inertias")},
-        str(data.attrs["input_hash"]),
-        resonance.line,
-        resonance.frequency,
-        resonance.speed,
-        {name: values[0] for name, values in before.items()},
-        ordered(results),
+        settings.hash_with(project.assembly()),
+        chosen.line,
+        chosen.frequency,
+        chosen.speed,
+        {name: values[0] for name, values in before[points[0]].items()},
+        ordered(results, ranking.quantity),
+        ranking.quantity,
+        resonance,
+        list(points),
+        [] if rated is None else rated[1],
     )
     write_design_study(project.folder / DESIGN_CHANGES_FILE, study)
     return study
@@ -149,19 +196,60 @@ def _proposed(project: ComputedProject, exciting: dict[str, int], resonance: Res
     modes = project.modes()
     mode = modes.nearest(resonance.frequency)
     families = {bearing.name: bearing.family for bearing in project.gearbox.bearings}
-    energies = dict(zip(modes.element_names, modes.strain[mode].tolist(), strict=True))
-    by_energy = sorted((name for name in energies if name in families), key=lambda name: -energies[name])
-    bearings = list(dict.fromkeys(families[name] for name in by_energy))[:BEARINGS]
+    strain = dict(zip(modes.element_names, modes.strain[mode].tolist(), strict=True))
+    energies: dict[str, float] = {}
+    for name, energy in strain.items():
+        if name in families:
+            energies[families[name]] = energies.get(families[name], 0.0) + energy
+    least = LEAST_ENERGY * sum(strain.values())
+    bearings = sorted((name for name in energies if energies[name] >= least), key=lambda name: -energies[name])
     return propose_changes(project.gearbox, exciting, deflections, bearings)
 
 
-def _changed_project(project: ComputedProject, change: DesignChange) -> ComputedProject:
+def _changed_gearbox(project: ComputedProject, change: DesignChange) -> Gearbox:
     """Check the changed gearbox as a file would be."""
     gearbox = project.gearbox.varied(change.keys)
     check_parts(gearbox)
     if reason := lacking(gearbox, project.choice.variant):
         raise gearbox.error(reason)
-    return _project_with(project, gearbox, change.name)
+    return gearbox
+
+
+def at_load(gearbox: Gearbox, load: str) -> Gearbox:
+    """Return a gearbox with the load of a load case, or with a percentage of its static load, as its static load.
+
+    Raises
+    ------
+    GearboxFileError
+        There is no such load case, or the percentage is no positive number.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> at_load(gearbox, "50%").case.static_load.torques_N_m
+    {'carrier': 120000.0}
+    """
+    if load == STATIC:
+        return gearbox
+    if load in gearbox.load_cases:
+        return gearbox_at_load(gearbox, gearbox.load_cases[load])
+    try:
+        share = 0.01 * float(load.removesuffix("%"))
+    except ValueError:
+        share = math.nan
+    if not (load.endswith("%") and 0.0 < share <= MOST_LOAD):
+        known = ", ".join(gearbox.load_cases) or "none in the file"
+        raise gearbox.error(
+            f"no load {load!r}; specify a load case ({known}) or a percentage of the static load from above 0 to "
+            f"{100.0 * MOST_LOAD:g}, such as 50%"
+        )
+    torques = gearbox.case.static_load.torques_N_m
+    return gearbox.varied({"static_load.torques_N_m": {body: share * torque for body, torque in torques.items()}})
+
+
+def _at_load(project: ComputedProject, gearbox: Gearbox, name: str, load: str) -> ComputedProject:
+    loaded = at_load(gearbox, load)
+    return _project_with(project, loaded, name if load == STATIC else f"{name}-at-{load.replace('%', '-percent')}")
 
 
 def _project_with(project: ComputedProject, gearbox: Gearbox, name: str) -> ComputedProject:
@@ -177,8 +265,13 @@ def _project_with(project: ComputedProject, gearbox: Gearbox, name: str) -> Comp
     return changed
 
 
-def _shortest_life(project: ComputedProject) -> float:
-    """Shortest basic rating life of the bearings with a catalogue, million revolutions; infinite without any."""
-    if project.choice.variant.spins_only:
-        return math.inf
-    return min((duty.basic_life for duty in project.bearings()), default=math.inf)
+def _margins(project: ComputedProject) -> tuple[dict[str, Margin], list[str]] | None:
+    """Rate a gearbox: its margins, and what falls short; None without a load spectrum or where it cannot be rated."""
+    case = project.gearbox.case
+    if case.loads is None or case.rating is None:
+        return None
+    try:
+        data = project.life()
+    except _REFUSALS:
+        return None
+    return margins_of(data, case.rating), shortfalls_of(data)

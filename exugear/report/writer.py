@@ -158,6 +158,7 @@ def write_report(
     allow_dir: Path | None = None,
     executor: Executor | None = None,
     compare: Path | None = None,
+    quantity: str | None = None,
 ) -> Report:
     """Write ``report.html`` from the content of a results folder: tables, runs, modes, steady-state responses.
 
@@ -171,6 +172,7 @@ def write_report(
         must be stored in the folder.
     executor : runs tasks in parallel where that saves time, such as `fe_ste.tools.threads.Workers`
     compare : results folder of another design to compare with
+    quantity : quantity that ranks the resonances, as `[report] quantity` of the gearbox file, which it replaces
 
     Raises
     ------
@@ -181,6 +183,8 @@ def write_report(
     """
     folder = Path(folder)
     gearbox = read_stored_gearbox(folder, Permissions(below=allow_dir))
+    if quantity is not None:
+        gearbox = gearbox.varied({"report.quantity": quantity})
     reference = gearbox.case.report.reference_frequency_Hz if target is None else target
     context = Context(folder, gearbox, reference, tell or (lambda what: None))
     material = _material(context, executor)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import scipy.linalg
@@ -181,8 +182,9 @@ def missed_tops(
             place = int(argmax[point, line])
             key = quantity.name, line, place, point - around.start, speeds[around].tobytes()
             if key not in known:
-                values = quantity.at(amplitude[around, line + 1], place)
-                known[key] = predicted_top(speeds[around], values, point - around.start)
+                values = quantity.components(amplitude[around, line + 1], place)
+                size = partial(quantity.size, place=place)
+                known[key] = predicted_top(speeds[around], values, point - around.start, size)
             top, height = known[key]
             near = APART * (speeds[point + 1] - speeds[point - 1])
             new = all(abs(top - other) > near for other in tops)

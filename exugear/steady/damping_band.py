@@ -17,12 +17,12 @@ from exugear.gearbox.load_cases import operating_range
 from exugear.steady.excitation import HarmonicBalanceModel
 from exugear.steady.harmonics.branches import standing_peaks
 from exugear.steady.mean_system.mean_system import MeanSystem
-from exugear.steady.mean_system.signals import Quantity, quantities_of
+from exugear.steady.mean_system.signals import Quantity
 from exugear.steady.response import linear_response, parametric_response, signals
 from exugear.steady.settings import Method
 from exugear.system.kernels.modal_damping import modal_matrix
 from exugear.system.modal_damping import with_modal_damping
-from fe_ste.tools.arrays import Booleans, Floats, Integers
+from fe_ste.tools.arrays import Booleans, Floats, Integers, SingleComplexes
 
 FACTORS = (0.5, 2.0)
 """Factors on the damping where the file states no range."""
@@ -53,12 +53,12 @@ class DampingBand:
             "band_amplitude": (
                 ("peak", "quantity", "damping_limit"),
                 self.amplitude,
-                {"long_name": words, "units": "m, N, m/s2"},
+                {"long_name": words, "units": "m, N, m/s2, m/s2"},
             ),
         }
 
 
-def damping_band(model: HarmonicBalanceModel, method: Method, speed: Floats, amplitude: Floats) -> DampingBand:
+def damping_band(model: HarmonicBalanceModel, method: Method, speed: Floats, amplitude: SingleComplexes) -> DampingBand:
     """Solve the highest peaks of a response again with the lowest and the highest plausible damping.
 
     Parameters
@@ -68,7 +68,7 @@ def damping_band(model: HarmonicBalanceModel, method: Method, speed: Floats, amp
     speed : (points,) of the overall input, rad/s, ascending
     amplitude : (points, lines, signals) of the response, of line 0 the mean
     """
-    quantities = quantities_of([signal.name for signal in model.signal_names])
+    quantities = model.quantities
     point, line, rises = _highest_peaks(model, quantities, speed, amplitude)
     found = np.zeros((len(point), len(quantities), 2))
     respond = {"linear": linear_response, "parametric": parametric_response}[method]
@@ -78,11 +78,11 @@ def damping_band(model: HarmonicBalanceModel, method: Method, speed: Floats, amp
             here = np.flatnonzero(point == at)
             for about in ABOUT:
                 response = respond(damped, damped.at(float(speed[at]) * (1.0 + about)))
-                sizes = 2.0 * np.abs(signals(damped, response)[line[here]])
+                own_signals = 2.0 * signals(damped, response)[line[here]]
                 for number, quantity in enumerate(quantities):
                     # A quantity without a peak there counts at the peak's speed: beside it others may rise.
                     counts = rises[here, number] | (about == 0.0)
-                    own = np.where(counts, quantity.sizes(sizes).max(axis=1), 0.0)
+                    own = np.where(counts, quantity.sizes(own_signals).max(axis=1), 0.0)
                     found[here, number, end] = np.maximum(found[here, number, end], own)
     return DampingBand(point, line, found, tuple(quantity.name for quantity in quantities))
 
@@ -112,7 +112,7 @@ def damping_limits(system: MeanSystem) -> tuple[MeanSystem, MeanSystem]:
 
 
 def _highest_peaks(
-    model: HarmonicBalanceModel, quantities: tuple[Quantity, ...], speed: Floats, amplitude: Floats
+    model: HarmonicBalanceModel, quantities: tuple[Quantity, ...], speed: Floats, amplitude: SingleComplexes
 ) -> tuple[Integers, Integers, Booleans]:
     """Points (k,) and lines (k,) of the highest peaks of any quantity, and which quantities (k, s) have one there.
 

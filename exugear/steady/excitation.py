@@ -48,9 +48,12 @@ from exugear.steady.mean_system.mesh_places import (
 from exugear.steady.mean_system.mesh_waves import MeshWaves, mesh_waves
 from exugear.steady.mean_system.signals import (
     AXES,
+    Quantity,
     SignalName,
     SignalRows,
     mesh_signal_names,
+    mount_names,
+    quantities_of,
     signal_rows,
 )
 from exugear.steady.mean_system.tooth_friction import FrictionResponse, tooth_friction
@@ -222,6 +225,11 @@ class HarmonicBalanceModel:
             ports.append(ports_with_bearings(self.ports_at(float(speed)), mean))
         other._ports = _stacked(ports)
         return other
+
+    @cached_property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """Quantities that describe the response, made of its signals."""
+        return quantities_of([own.name for own in self.signal_names], mount_names(self.waves.assembly))
 
     @cached_property
     def weights(self) -> Floats:

@@ -17,7 +17,7 @@ from exugear.gearbox.units import RPM
 from exugear.gearbox.versions import STEADY
 from exugear.results.folder import modes_path
 from exugear.steady.campbell import LAYOUT
-from exugear.steady.mean_system.signals import carried_seats
+from exugear.steady.mean_system.signals import Quantity, carried_seats, mount_names, quantities_of
 from exugear.steady.peaks import line_name
 from exugear.steady.settings import SpeedRange, SteadySettings, usual_speeds
 from exugear.steady.steady_response import SolvedPoints, SteadyResponse, response_of
@@ -26,6 +26,7 @@ from exugear.system.build import assemble
 from exugear.system.statics import meshes_near_unconverged
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.element import MeshData
+from fe_ste.tools.arrays import SingleComplexes
 from fe_ste.tools.stores import Layout, Store, load_dataset
 
 if TYPE_CHECKING:
@@ -66,6 +67,7 @@ _LAYOUT = Layout(
         "harmonics",
         "operating_range",
         "carried_seats",
+        "mounts",
     ),
 )
 
@@ -154,6 +156,7 @@ def _attributes(response: SteadyResponse) -> dict[str, Any]:
         "stiffness_variation": response.stiffness_variation,
         "operating_range": json.dumps(operating_range(assembly.gearbox)),
         "carried_seats": json.dumps(carried_seats(assembly)),
+        "mounts": json.dumps(mount_names(assembly)),
         "harmonics": response.harmonics,
         "change_with_more": response.change_with_more,
         "shared_lines": "; ".join(_shared(row, response.base_names) for row in response.lines.shared()),
@@ -199,6 +202,17 @@ def load_response(path: str | Path) -> xr.Dataset:
     fe_ste.tools.files.FileError: nowhere/steady-parametric.nc: no such file
     """
     return with_names(load_dataset(Path(path), _LAYOUT))
+
+
+def response_quantities(data: xr.Dataset) -> tuple[Quantity, ...]:
+    """Return the quantities that describe a stored response, made of its signals."""
+    return quantities_of([str(name) for name in data["signal"].to_numpy()], json.loads(str(data.attrs["mounts"])))
+
+
+def complex_amplitudes(data: xr.Dataset) -> SingleComplexes:
+    """Return the complex amplitudes (points, lines, signals) of a stored response; of line 0 the mean."""
+    phase = data["phase"].to_numpy()
+    return np.asarray(data["amplitude"].to_numpy() * (np.cos(phase) + 1j * np.sin(phase)), dtype=np.complex64)
 
 
 def with_names(data: xr.Dataset) -> xr.Dataset:

@@ -30,7 +30,7 @@ from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
 from exugear.steady.harmonics.lines import LineSet
 from exugear.steady.mean_system.mesh_places import DEFLECTION
 from exugear.steady.mean_system.rotating_frame import SteadyError
-from exugear.steady.mean_system.signals import Quantity, SignalName, quantities_of
+from exugear.steady.mean_system.signals import Quantity, SignalName
 from exugear.steady.nonlinear import HarmonicResidual, Tangent, growth_of_state
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.response import Response, dissipated_and_given, signals
@@ -349,8 +349,8 @@ def _band(solver: PointSolver, solved: SolvedPoints) -> DampingBand:
     """Find how high the highest peaks are over the range of damping, where the method is linear in the deflections."""
     model = solver.linear
     if solver.method == "nonlinear" or model.loses_contact:
-        return no_band(tuple(quantity.name for quantity in quantities_of([s.name for s in model.signal_names])))
-    return damping_band(model, solver.method, solved.speed, np.abs(solved.amplitude).astype(np.float64))
+        return no_band(tuple(quantity.name for quantity in model.quantities))
+    return damping_band(model, solver.method, solved.speed, solved.amplitude)
 
 
 def _tracks(model: HarmonicBalanceModel, speeds: Floats) -> ModeTracks:
@@ -388,7 +388,7 @@ def _with_tops(solver: PointSolver, solved: SolvedPoints, work: _Work) -> Solved
 
     Each such state starts independently of others, so that a resumed computation gives the same results.
     """
-    quantities = quantities_of([signal_name.name for signal_name in solver.model.signal_names])
+    quantities = solver.model.quantities
     operation = operating_range(solver.model.waves.assembly.gearbox)
     tops: KnownTops = {}
     for _ in range(ROUNDS):

@@ -145,6 +145,7 @@ def steady(
             "--continuation", help="Continuation: follow the solution through turning points (method nonlinear)."
         ),
     ] = False,
+    quantity: options.QuantityOption = None,
     out: options.OutOption = None,
     allow_dir: options.FilesBelowOption = None,
     scripts: options.ScriptsOption = False,
@@ -161,7 +162,7 @@ def steady(
     project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias, load_case)
     if load_case is not None:
         project = project.at_load_case(load_case)
-    task.steady(project, task.settings_of_options(project, method, speeds, harmonics, branches), as_json)
+    task.steady(project, task.settings_of_options(project, method, speeds, harmonics, branches), quantity, as_json)
 
 
 def run(
@@ -391,6 +392,7 @@ def view(
             show_default=False,
         ),
     ] = None,
+    quantity: options.QuantityOption = None,
     animation: Annotated[
         bool, typer.Option("--gif", help="Also write an animated GIF of the mode or resonance shown first.")
     ] = False,
@@ -410,7 +412,7 @@ def view(
     if near is not None and resonance is not None:
         raise BadInputError(f"--near {near:g} and --resonance {resonance}: only one can be shown first; omit one")
     project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias)
-    task.view(project, near, resonance, animation, as_json)
+    task.view(project, near, resonance, quantity, animation, as_json)
 
 
 def report(
@@ -428,6 +430,25 @@ def report(
             "--levers", help="First compute what design changes do to the highest resonance, which takes minutes."
         ),
     ] = False,
+    resonance: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="With --levers: rank of the resonance to reduce. (default: 1)",
+            show_default=False,
+        ),
+    ] = None,
+    load: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME|PERCENT%",
+            help="With --levers: load case, or percentage of the static load, such as 50%; may be repeated. (default: "
+            "static load)",
+            show_default=False,
+        ),
+    ] = None,
+    quantity: options.QuantityOption = None,
     compare: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Results folder of another design to compare with.", show_default=False),
@@ -443,4 +464,5 @@ def report(
     """
     from exugear.cli.tasks import report as task
 
-    task.report(folder, near, stored, levers, compare, allow_dir, as_json)
+    changes = task.DesignOptions(levers, resonance, tuple(load or ()), quantity)
+    task.report(folder, near, stored, changes, compare, allow_dir, as_json)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, nullcontext, suppress
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from exugear.cli.case import check_allow_dir
@@ -26,6 +26,7 @@ from exugear.gearbox.named_files import Permissions
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.project import default_folder
+from exugear.report.design_study import at_load
 from exugear.report.findings.context import ReportError, choice_of
 from exugear.report.findings.design_changes import LEAST_DB, DesignStudy
 from exugear.report.findings.other_design import check_ranges
@@ -42,11 +43,22 @@ from fe_ste.tools.files import FileError
 from fe_ste.tools.threads import Workers, available_cores
 
 
+@dataclass(frozen=True)
+class DesignOptions:
+    """Options of the ranking and of design changes."""
+
+    levers: bool
+    """Whether design changes are computed."""
+    resonance: int | None
+    loads: tuple[str, ...]
+    quantity: str | None
+
+
 def report(
     folder: Path,
     near: float | None,
     stored: bool,
-    levers: bool,
+    changes: DesignOptions,
     compare: Path | None,
     allow_dir: Path | None,
     as_json: bool,
@@ -57,6 +69,8 @@ def report(
         raise BadInputError(f"{folder}: no such folder; specify the results folder of `exugear run`")
     if compare is not None and not compare.is_dir():
         raise BadInputError(f"{compare}: --compare: no such folder; specify the results folder of another design")
+    if not changes.levers and (changes.resonance is not None or changes.loads):
+        raise BadInputError("--resonance and --load are for design changes: add --levers")
     folder = _results_of(folder)
     other = None if compare is None else _results_of(compare)
     if other is not None:
@@ -64,8 +78,8 @@ def report(
     if not stored:
         _compute_missing(folder, allow_dir)
     study = None
-    if levers:
-        study = _design_changes(folder, allow_dir)
+    if changes.levers:
+        study = _design_changes(folder, allow_dir, changes)
     try:
         with time_noted(folder, "report"), progress_bar() as bar, _parallel_worker() as executor:
             task = bar.add_task("report", total=None)
@@ -74,7 +88,7 @@ def report(
                 interruption.check()
                 bar.update(task, description=what)
 
-            written = write_report(folder, near, tell, allow_dir, executor, other)
+            written = write_report(folder, near, tell, allow_dir, executor, other, changes.quantity)
     except ReportError as error:
         raise BadInputError(error) from error
     _print_report(folder, written, study, as_json)
@@ -122,14 +136,31 @@ def _compute_missing(folder: Path, allow_dir: Path | None) -> None:
             richest.steady(SteadySettings(operating_speeds(project.gearbox)))
 
 
-def _design_changes(folder: Path, allow_dir: Path | None) -> DesignStudy:
-    """Compute the design changes of the variant with most degrees of freedom that the file allows."""
+def _design_changes(folder: Path, allow_dir: Path | None, changes: DesignOptions) -> DesignStudy:
+    """Compute the design changes of the model that the page leads with, or of the usual variant without a response."""
     gearbox = read_stored_gearbox(folder, Permissions(below=allow_dir))
-    project = WatchedProject(gearbox, folder, Choice(usual_variant(gearbox)))
+    stored = []
+    for path in sorted(folder.glob("*/*/steady-*.nc")):
+        with suppress(FileError, ValueError, KeyError):
+            choice = choice_of(load_response(path).attrs)
+            if choice.inertias == gearbox.case.default_inertias and LAWS[choice.mesh_model].needs_tables:
+                stored.append(choice)
+    usual = Choice(usual_variant(gearbox))
+    leading = max(stored, key=lambda choice: list(Variant).index(choice.variant), default=usual)
+    project = WatchedProject(gearbox, folder, leading)
+    for load in changes.loads:  # before long work
+        at_load(gearbox, load)
     project.prepare()
-    study = project.design_changes(lambda done, total, words: note(f"Design change {done + 1} of {total}: {words}"))
+    number = changes.resonance or 1
+    study = project.design_changes(
+        lambda done, total, words: note(f"Design change {done + 1} of {total}: {words}"),
+        resonance=number,
+        quantity=changes.quantity,
+        loads=changes.loads,
+    )
     if study is None:
-        raise BadInputError(f"{folder}: --levers: no resonance in the operating range; nothing to reduce")
+        what = "no resonance" if number == 1 else f"no resonance {number}"
+        raise BadInputError(f"{folder}: --levers: {what} in the operating range; nothing to reduce")
     return study
 
 
@@ -158,8 +189,9 @@ def _print_report(folder: Path, written: Report, study: DesignStudy | None, as_j
     if as_json:
         times = {entry.step: entry.seconds for entry in spent}
         lists = {name: list(getattr(written, name)) for name in ("statements", "resonances", "missing", "left_out")}
-        changes = [asdict(result) for result in (study.results if study else ())]
-        print_json({"report": str(written.path), **lists, "design_changes": changes, "seconds": times})
+        changes = [{**asdict(one), "recommended": one.recommended} for one in (study.results if study else ())]
+        found = {"design_changes": changes, "design_changes_loads": list(study.loads) if study else []}
+        print_json({"report": str(written.path), **lists, **found, "seconds": times})
         return
     if study is not None:
         _print_changes(study)
@@ -177,20 +209,31 @@ TIMES = (
 
 
 def _print_changes(study: DesignStudy) -> None:
-    """Print the effects of the design changes: on this peak, and on the highest amplitude in the operating range."""
-    columns = [Column("change", "change", is_text=True)]
-    for name, label in QUANTITIES.items():
-        columns.append(Column(f"{label.short}\nhere", f"{name}_this_peak", _decibels, missing="–"))
-        columns.append(Column(f"{label.short}\nrange", f"{name}_highest", _decibels, missing="–"))
-    columns.append(Column("price", "price", is_text=True))
+    """Print the recommended changes, and why each other one is not recommended."""
+    label = QUANTITIES[study.quantity]
+    others = [name for name in QUANTITIES if name != study.quantity and name in study.amplitudes]
+    columns = [
+        Column("change", "change", is_text=True),
+        Column(f"{label.short}\nhere", f"{study.quantity}_this_peak", _decibels, missing="–"),
+        *(
+            Column(f"{QUANTITIES[name].short}\nrange", f"{name}_highest", _decibels, missing="–")
+            for name in (study.quantity, *others)
+        ),
+        Column("recommended; price", "verdict", is_text=True),
+    ]
     rows = []
     for result in study.results:
-        row = {"change": result.change.words, "price": result.refusal or result.price}
+        verdict = result.refusal or result.objection or ("yes" if result.recommended else "assumption")
+        row = {"change": result.change.words, "verdict": "; ".join(filter(None, (verdict, result.price)))}
         for name, effect in result.effects.items():
             row |= {f"{name}_{key}": value for key, value in vars(effect).items()}
         rows.append(row)
-    title = f"Design changes for {study.frequency:.3g} Hz at {abs(study.speed) / RPM:.4g} rpm, {study.line}, dB"
-    print_table(title, rows, columns, "here: this peak; range: highest amplitude of any order.")
+    title = f"Design changes for resonance {study.number}, {study.frequency:.3g} Hz at {abs(study.speed) / RPM:.4g} rpm"
+    title += f", {study.line}, dB; loads: {', '.join(study.loads)}"
+    legend = "here: this peak; range: highest amplitude of any order. Only recommended changes are rated."
+    print_table(title, rows, columns, legend)
+    for line in study.requirements:
+        warn(f"the unchanged gearbox fails a requirement: {line}")
 
 
 def _decibels(value: float) -> str:

@@ -53,7 +53,7 @@ def settings_of_options(
     return SteadySettings(asked, method, harmonics, branches=branches)
 
 
-def steady(project: WatchedProject, settings: SteadySettings, as_json: bool) -> None:
+def steady(project: WatchedProject, settings: SteadySettings, quantity: str | None, as_json: bool) -> None:
     """Compute, store and print the response of a project."""
     gearbox = project.gearbox
     # A variant without steady-state response is refused before tables and finite elements are computed.
@@ -65,7 +65,7 @@ def steady(project: WatchedProject, settings: SteadySettings, as_json: bool) -> 
     project.prepare()
     data = project.steady(settings)
     shuttling = neglected_shuttling(project)
-    summary = summarise(project, settings, data, shuttling)
+    summary = summarise(project, settings, data, shuttling, quantity or gearbox.case.report.quantity)
     _warn_of_other_loads(gearbox)
     _warn_of_response(data, summary)
     _print_excitation(summary, shuttling)
@@ -80,11 +80,15 @@ def steady(project: WatchedProject, settings: SteadySettings, as_json: bool) -> 
 
 
 def summarise(
-    project: Project, settings: SteadySettings, data: xr.Dataset, shuttling: tuple[Shuttling, ...]
+    project: Project,
+    settings: SteadySettings,
+    data: xr.Dataset,
+    shuttling: tuple[Shuttling, ...],
+    quantity: str | None = None,
 ) -> dict[str, Any]:
-    """Summarise a response, with units in the keys."""
+    """Summarise a response, with units in the keys; `quantity` ranks the resonances."""
     law = LAWS[str(data.attrs["mesh_model"])]
-    ranking = ranking_of(data)
+    ranking = ranking_of(data, wanted=quantity)
     excited = bool((data["amplitude"][:, 1:, 0] > LEAST_AMPLITUDE).any())
     return {
         "case": project.gearbox.source,
@@ -114,6 +118,8 @@ def summarise(
         "ranked_speeds_rpm": [speed / RPM for speed in ranking.speeds],
         "ranked_over_all_speeds": ranking.whole,
         "accelerations_of": ranking.accelerates,
+        "ranked_by": ranking.quantity,
+        "ranked_by_reason": ranking.reason,
         "resonances": [resonance.summary() for resonance in ranking.resonances],
         "peaks_of_overall_dte": [
             {
@@ -280,7 +286,8 @@ def _fail_if_invalid(data: xr.Dataset) -> None:
 
 def _print_response(gearbox: Gearbox, summary: Mapping[str, Any], fastest: float) -> None:
     """Print the ranking, and the number of speeds, stability and damping of the response."""
-    title = f"Resonance ranking, {_ranked_speeds(summary)}, variant {summary['variant']}, {summary['method']}"
+    title = f"Resonances by {QUANTITIES[summary['ranked_by']].column}, {_ranked_speeds(summary)}"
+    title += f", variant {summary['variant']}, {summary['method']}"
     title += f", at {summary['static_load']}".replace(" N m", f"{HARD_SPACE}N{HARD_SPACE}m")
     print_ranking(title, summary)
     _print_bands(gearbox.case.damping.modal_band_percent, summary["resonances"][:SHOWN_RESONANCES])
@@ -308,11 +315,12 @@ def print_ranking(title: str, summary: Mapping[str, Any]) -> None:
     quantities = [quantity for quantity in QUANTITIES if f"{quantity}_place" in resonances[0]]
     for quantity in quantities:
         columns.append(Column(_heading(quantity), partial(_amplitude, quantity)))
-        if quantity == "force":
-            columns.append(Column("bearing", "force_at", is_text=True))
+        if quantity == summary["ranked_by"] and quantity != "error":
+            columns.append(Column("at", f"{quantity}_at", is_text=True))
     if "force" in quantities:
         owner = {"shafts": "shaft", "housing": "housing"}.get(summary["accelerations_of"], summary["accelerations_of"])
         legend += f"; force: largest dynamic bearing force; accel.: {owner} at the bearing"
+        legend += "; mounts: acceleration at mounts" if "mount_acceleration" in quantities else ""
     print_table(title, resonances, columns, f"{legend}.")
 
 

@@ -41,7 +41,14 @@ SHOWN_RESONANCES = 10
 """Number of listed resonances of the ranking."""
 
 
-def view(project: WatchedProject, near: float | None, resonance: int | None, animation: bool, as_json: bool) -> None:
+def view(
+    project: WatchedProject,
+    near: float | None,
+    resonance: int | None,
+    quantity: str | None,
+    animation: bool,
+    as_json: bool,
+) -> None:
     """Write the page of a project."""
     project.begin()
     project.prepare()
@@ -56,7 +63,7 @@ def view(project: WatchedProject, near: float | None, resonance: int | None, ani
         headline = None
         about = f"Vibration at resonances in operation needs a steady-state response: {command}"
     else:
-        ranking = ranking_of(response)
+        ranking = ranking_of(response, wanted=quantity or project.gearbox.case.report.quantity)
         count = len(ranking.resonances)
         if resonance is not None and resonance > count:
             raise BadInputError(f"--resonance {resonance}: the ranking has {count} resonances; choose one or omit it")

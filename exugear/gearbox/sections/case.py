@@ -221,8 +221,11 @@ class OperationSection(Section):
 
 
 class ReportSection(Section):
-    """Reference values of a report, such as a measured or published frequency."""
+    """Settings of rankings and reports: the deciding quantity, and a measured or published frequency."""
 
+    quantity: Literal["transmission_error", "bearing_force", "acceleration"] | None = None
+    """Quantity by which resonances are ranked. By default the acceleration at the mounts of a flexible housing, or else
+    the bearing force, or with ideal joints the transmission error."""
     reference_frequency_Hz: q.FrequencyHz | None = None
     """Frequency near which modes are listed, such as a measured one."""
 

@@ -324,7 +324,9 @@ def best_words(words: Labels, best: BestChange) -> str:
     """State whether the best change of a parameter is worthwhile."""
     change = words.change(best.label, best.value, best.default)
     if best.gain < NO_GAIN:
-        return "No effect on the response within one octave."
+        if best.span < NO_GAIN:
+            return "No effect on the response within one octave."
+        return f"Other values only raise the response within one octave, by up to {figure_text(best.span, 2)} dB."
     if best.gain < GAIN:
         return (
             f"No single change lowers the response within one octave by {GAIN:g} dB; best: {change}, −"

@@ -64,6 +64,9 @@ from exugear.steady.settings import METHODS
 from exugear.steady.steady_file import settings_of, steady_path
 from fe_ste.tools.arrays import Floats
 
+SAME_FREQUENCY = 0.01
+"""Relative frequency difference within which a peak or a mode belongs to a resonance."""
+
 
 @dataclass(frozen=True)
 class RankedResonance:
@@ -151,6 +154,28 @@ class RunGroup:
     def loudest(self) -> RankedResonance | None:
         """Highest resonance of the main variant that is found with all window lengths."""
         return next((own for own in self.ranked[self.main] if own.steady), None)
+
+    def shown_peak(self, own: RankedResonance) -> Pick:
+        """Return the peak by which a resonance is shown: that of the headline, or the highest in the operating range.
+
+        A mode has a peak for each order that excites it; several of them may be outside the range. Without a peak
+        inside, it is the highest of all.
+        """
+        picks = own.finding.resonance.picks
+        if leading := next(filter(self.is_leading, picks), None):
+            return leading
+        low, high = self.in_operation.speeds
+        inside = [pick for pick in picks if low <= abs(pick.speed) <= high]
+        return max(inside, key=lambda pick: pick.level, default=own.peak)
+
+    def is_leading(self, peak: Pick) -> bool:
+        """Return whether a peak is that of the first resonance of the ranking."""
+        top = next(iter(self.in_operation.resonances), None)
+        return (
+            top is not None
+            and math.isclose(peak.line.order, top.order, rel_tol=1e-6)
+            and math.isclose(peak.frequency, top.frequency, rel_tol=SAME_FREQUENCY)
+        )
 
     def choice(self, variant: str) -> Choice:
         """Return the model settings of a run."""
@@ -241,10 +266,11 @@ def _group(
     comparisons = {} if reference is None else {name: compare(run, reference) for name, run in others.items()}
     main = list(runs)[-1]
     stated = operating_range(context.gearbox)
-    in_operation = _ranking(runs[main], ranked[main], loud, stated)
+    wanted = context.gearbox.case.report.quantity
+    in_operation = _ranking(runs[main], ranked[main], loud, stated, wanted)
     if not in_operation.resonances and not in_operation.whole:
         speed = runs[main].spectra.speed
-        everywhere = _ranking(runs[main], ranked[main], loud, (float(speed.min()), float(speed.max())))
+        everywhere = _ranking(runs[main], ranked[main], loud, (float(speed.min()), float(speed.max())), wanted)
         in_operation = replace(everywhere, whole=True, without=in_operation.speeds)
     return RunGroup(
         source, *key[1:], runs, ranked, comparisons, constant, responses, in_operation=in_operation, response=loud
@@ -256,10 +282,11 @@ def _ranking(
     ranked: Sequence[RankedResonance],
     response: xr.Dataset | None,
     stated: tuple[float, float] | None,
+    wanted: str | None,
 ) -> Ranking:
     """Rank the resonances of a steady-state response, or else of a run-up, within given speeds (rad/s)."""
     if response is not None:
-        return ranking_of(response, stated)
+        return ranking_of(response, stated, wanted)
     peaks = [
         (own.peak.line, own.speed, own.frequency, 1e-6 * 10.0 ** (own.peak.level / 20.0))
         for own in ranked

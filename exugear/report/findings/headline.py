@@ -1,4 +1,4 @@
-"""The resonance that a report leads with: its mode, its cause, what would reduce it, and what could overturn it.
+"""The resonance that a report leads with: its mode, its cause, and what could overturn it.
 
 All statements are about the first resonance of one `Ranking`: that of the most informative steady-state response, or
 else of a run-up, or else an estimate from modes and static transmission errors.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +18,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.load_cases import operating_range
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import METHOD_LABELS, Context, PairExcitation, StoredResults, excitations
-from exugear.report.findings.groups import RunGroup
+from exugear.report.findings.groups import SAME_FREQUENCY, RunGroup
 from exugear.report.findings.ranking import Envelope, Ranking, Resonance, envelopes, ranking_of, ranking_of_errors
 from exugear.report.findings.words import Labels
 from exugear.results.spectra.run_spectra import report_mode
@@ -29,8 +29,6 @@ from exugear.steady.point_solver import harmonic_balance_model
 from exugear.steady.steady_file import settings_of
 from exugear.system.tooth_mesh.laws.registry import LAWS
 
-SAME_FREQUENCY = 0.01
-"""Relative frequency difference within which a mode belongs to a resonance."""
 SAME_SPEED = 0.01
 """Relative speed difference within which an order crosses the mode of a resonance."""
 BEYOND = (0.75, 1.5)
@@ -136,7 +134,7 @@ class Headline:
         if self.response is None or self.ranking.whole:
             return None
         low, high = self.ranking.speeds
-        wide = ranking_of(self.response, (BEYOND[0] * low, BEYOND[1] * high))
+        wide = ranking_of(self.response, (BEYOND[0] * low, BEYOND[1] * high), self.ranking.wanted)
         return next((own for own in wide.resonances if not low <= abs(own.speed) <= high), None)
 
 
@@ -198,7 +196,7 @@ def _estimated(context: Context, modes: xr.Dataset, found: Mapping[str, PairExci
     return ranking_of_errors(peaks, np.array([peak[1] for peak in peaks]), stated)
 
 
-# Cause of a resonance, and first-order changes of its amplitude
+# Cause of a resonance
 
 
 @dataclass(frozen=True)
@@ -214,29 +212,6 @@ class Cause:
     """Overlap ratio."""
     share: float | None
     """Fraction of the amplitude that the meshes of this pair cause; None where it is not computed."""
-
-
-@dataclass(frozen=True)
-class Change:
-    """First-order change of the transmission error at the peak for a change of one parameter by 10 %."""
-
-    what: str
-    """Label, such as "stiffness of bearing A"."""
-    more: bool
-    """Whether the parameter has to increase for the amplitude to decrease."""
-    gain: float
-    """Decrease of the amplitude, dB; where the first order no longer holds, at least this."""
-    bounded: bool
-    """Whether the first order no longer holds."""
-
-
-STEP = 0.1
-"""Relative change of a parameter."""
-SHOWN_CHANGES = 3
-LEAST_GAIN = 0.1
-"""Smallest listed decrease, dB."""
-FIRST_ORDER = 0.5
-"""Relative change of the amplitude beyond which the first order does not hold."""
 
 
 def contributions_of(context: Context, headline: Headline) -> Contributions | None:
@@ -273,20 +248,3 @@ def causes_of(
         size = float(table.harmonics[harmonic - 1])
         causes.append(Cause(pair.name, harmonic, size, float(np.ptp(table.error)), pair.overlap_ratio, share))
     return tuple(sorted(causes, key=lambda cause: -abs(cause.share or cause.amplitude)))
-
-
-def changes_of(words: Labels, known: Contributions | None) -> tuple[Change, ...]:
-    """Return the changes of a stiffness or an inertia by 10 % that reduce the peak most, to first order."""
-    if known is None:
-        return ()
-    kinds = (("stiffness", known.supports), ("inertia", known.bodies))
-    slopes = [(f"{kind} of {words.of(name)}", slope) for kind, values in kinds for name, slope in values.items()]
-    return tuple(sorted(_changes(slopes), key=lambda change: -change.gain)[:SHOWN_CHANGES])
-
-
-def _changes(slopes: Sequence[tuple[str, float]]) -> Iterator[Change]:
-    for label, slope in slopes:
-        relative = min(STEP * abs(slope), FIRST_ORDER)
-        gain = -20.0 * math.log10(1.0 - relative)
-        if gain > LEAST_GAIN:
-            yield Change(label, slope < 0.0, gain, STEP * abs(slope) > FIRST_ORDER)

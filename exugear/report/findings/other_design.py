@@ -76,6 +76,8 @@ def read_other_design(context: Context, headline: Headline | None, folder: Path)
         One of both has no ranked resonances, or the operating ranges differ.
     """
     gearbox = read_stored_gearbox(folder, Permissions(below=context.gearbox.permissions.below))
+    if headline is not None:
+        gearbox = gearbox.varied({"report.quantity": headline.ranking.wanted})
     found = Context(folder, gearbox, None, context.tell)
     results = with_responses(found, stored_models(found))
     other = headline_of(found, results, groups_of(found, results))

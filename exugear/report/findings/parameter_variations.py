@@ -65,6 +65,8 @@ class BestChange:
     default: float
     gain: float
     """Reduction of the largest amplification in the octave, dB; positive: lower."""
+    span: float
+    """Difference between its highest and its lowest value over the parameter, dB."""
 
 
 def begin_variations(context: Context, modes: Mapping[Choice, xr.Dataset], executor: Executor) -> Future[VariedModels]:
@@ -145,8 +147,8 @@ def track_mode(variation: ParameterVariation, frequency: float) -> TrackedMode:
 
 def best_change(variation: ParameterVariation, frequency: float) -> BestChange:
     """Find the parameter value with the smallest maximum amplification within an octave of a mode."""
-    loudest = track_mode(variation, frequency).loudest
-    index = int(np.argmin(loudest))
-    gain = 20.0 * np.log10(max(loudest[default_place(variation)], 1e-300) / max(loudest[index], 1e-300))
+    level = 20.0 * np.log10(np.maximum(track_mode(variation, frequency).loudest, 1e-300))
+    index = int(np.argmin(level))
+    gain = float(level[default_place(variation)] - level[index])
     parameter = variation.parameter
-    return BestChange(parameter.label, parameter.values[index], parameter.default, float(gain))
+    return BestChange(parameter.label, parameter.values[index], parameter.default, gain, float(np.ptp(level)))

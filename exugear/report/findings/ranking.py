@@ -1,13 +1,14 @@
 """Ranking of resonances of a stored steady-state response by transmission error, bearing force and acceleration.
 
-The relevant quantity depends on the purpose (noise or strength), and none replaces another. All three are therefore
-listed, each with its rank, and the resonances are sorted by their best rank in any quantity.
+The relevant quantity depends on the purpose (noise or strength), and none replaces another. One of them decides the
+order of the ranking (`deciding_quantity`); every quantity is listed with its rank. Resonances without a peak in the
+deciding quantity follow, by their best rank in another one.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -20,10 +21,10 @@ from exugear.report.findings.context import choice_of
 from exugear.results.spectra.line_spectra import LineSpectra, line_spectra
 from exugear.results.spectra.waterfall import OrderLine
 from exugear.steady.harmonics.branches import standing_peaks
-from exugear.steady.mean_system.signals import Quantity, quantities_of
+from exugear.steady.mean_system.signals import Quantity, vector_peak
 from exugear.steady.peaks import SWEEP_SHIFT, line_name
 from exugear.steady.settings import METHODS
-from exugear.steady.steady_file import settings_of
+from exugear.steady.steady_file import complex_amplitudes, response_quantities, settings_of
 from fe_ste.tools.arrays import Booleans, Floats
 
 if TYPE_CHECKING:
@@ -34,10 +35,25 @@ SAME_SPEED_TOLERANCE = 0.01
 """Relative speed difference within which peaks of one order in several quantities are one resonance."""
 MIN_RELATIVE_PEAK = 1e-9
 """Peaks below this fraction of the largest peak of their quantity are round-off."""
-MIN_EXCITED = {"error": 1e-12, "force": 1e-6, "acceleration": 1e-9}
+MIN_EXCITED = {"error": 1e-12, "force": 1e-6, "acceleration": 1e-9, "mount_acceleration": 1e-9}
 """Amplitudes below which nothing is excited, in the units of the quantities."""
-UNIT_KEYS = {"error": "m", "force": "N", "acceleration": "m_per_s2"}
+UNIT_KEYS = {"error": "m", "force": "N", "acceleration": "m_per_s2", "mount_acceleration": "m_per_s2"}
 """Units in the keys of ``--json``."""
+DECIDING = {
+    "transmission_error": ("error",),
+    "bearing_force": ("force",),
+    "acceleration": ("mount_acceleration", "acceleration"),
+}
+"""Quantities by their name in a gearbox file; the first that is available decides."""
+USUAL = ("mount_acceleration", "force", "error")
+"""Quantities that decide by default."""
+ONLY_QUANTITY = "the only quantity with ideal joints"
+REASONS = {
+    "mount_acceleration": "default for a flexible housing on mounts",
+    "force": "default for elastic bearings",
+    "error": ONLY_QUANTITY,
+}
+"""Why a quantity decides by default."""
 SHAFTS = "shafts"
 HOUSING = "housing"
 BOTH = "shafts and housing"
@@ -58,9 +74,10 @@ class PeakAmplitude:
     """Amplitude and rank of a resonance in one quantity."""
 
     amplitude: float
-    """Peak amplitude of the order, in units of the quantity; for planets the root mean square over them."""
+    """Peak amplitude of the order, in units of the quantity: of a force or an acceleration the largest magnitude of
+    its vector, for planets the root mean square over them."""
     at: str
-    """Bearing with the largest amplitude, for planets their family; empty for the transmission error."""
+    """Bearing or mount with the largest amplitude, for planets their family; empty for the transmission error."""
     place: int | None
     """Rank among the peaks of that quantity, 1 for the highest; None on the flank of a higher peak."""
     limits: tuple[Limit, Limit] | None = None
@@ -84,11 +101,13 @@ class Resonance:
     order: float
     """Periods per revolution of the input."""
     speed: float
-    """Input speed at the peak of the quantity with the best rank, rad/s."""
+    """Input speed at the peak of the quantity that decides the ranking, or else of the one with the best rank, rad/s.
+    """
     frequency: float
     """Hz."""
     amplitudes: Mapping[str, PeakAmplitude]
-    """By quantity: ``error`` (m), ``force`` (N) and ``acceleration`` (m/s2); the last two only with bearings."""
+    """By quantity: ``error`` (m); with bearings ``force`` (N) and ``acceleration`` (m/s2); with mounts of a flexible
+    housing ``mount_acceleration`` (m/s2)."""
 
     @property
     def best(self) -> int:
@@ -119,7 +138,7 @@ class Resonance:
 
 @dataclass(frozen=True)
 class Ranking:
-    """Resonances of a steady-state response, sorted by the best rank in any quantity."""
+    """Resonances of a steady-state response, sorted by one quantity."""
 
     resonances: tuple[Resonance, ...]
     speeds: tuple[float, float]
@@ -130,15 +149,52 @@ class Ranking:
     """Parts whose acceleration is given: the shafts where the housing is rigid."""
     without: tuple[float, float] | None = None
     """Operating range (rad/s) in which there is no resonance, where all speeds are ranked instead."""
+    quantity: str = "error"
+    """Quantity that decides the order."""
+    reason: str = ONLY_QUANTITY
+    """Why it decides, as text."""
+
+    @property
+    def wanted(self) -> str:
+        """Name of the deciding quantity in a gearbox file."""
+        return next(name for name, own in DECIDING.items() if self.quantity in own)
+
+    def leader(self, quantity: str) -> Resonance | None:
+        """Return the resonance with the highest amplitude of a quantity; None without a peak."""
+        return next((own for own in self.resonances if own.amplitudes[quantity].place == 1), None)
 
 
-def ranking_of(data: xr.Dataset, speeds: tuple[float, float] | None = None) -> Ranking:
+def deciding_quantity(available: Collection[str], wanted: str | None) -> tuple[str, str]:
+    """Return the quantity that decides the order of a ranking, and the reason as text.
+
+    Parameters
+    ----------
+    available : quantities of a response
+    wanted : name as in `DECIDING`; None for the default
+
+    Examples
+    --------
+    >>> deciding_quantity(("error", "force", "acceleration"), "acceleration")
+    ('acceleration', 'as chosen')
+    >>> deciding_quantity(("error", "force", "acceleration", "mount_acceleration"), None)
+    ('mount_acceleration', 'default for a flexible housing on mounts')
+    """
+    if wanted is not None:
+        for quantity in DECIDING[wanted]:
+            if quantity in available:
+                return quantity, "as chosen"
+    quantity = next(own for own in USUAL if own in available)
+    return quantity, REASONS[quantity]
+
+
+def ranking_of(data: xr.Dataset, speeds: tuple[float, float] | None = None, wanted: str | None = None) -> Ranking:
     """Rank the resonances of a steady-state response within the operating range or other speeds.
 
     Parameters
     ----------
     data : as `exugear.steady.steady_file.load_response` reads it
     speeds : lowest and highest absolute input speed, rad/s; by default the operating range of the file
+    wanted : quantity that decides the order, as in `DECIDING`; see `deciding_quantity` for the default
 
     Notes
     -----
@@ -148,18 +204,19 @@ def ranking_of(data: xr.Dataset, speeds: tuple[float, float] | None = None) -> R
     speed = np.abs(data["speed"].to_numpy().astype(np.float64))
     low, high, whole = _range(json.loads(str(data.attrs["operating_range"])) if speeds is None else speeds, speed)
     inside = (speed >= low) & (speed <= high)
-    amplitude: Floats = data["amplitude"].to_numpy()[:, 1:].astype(np.float64)
-    quantities = quantities_of([str(name) for name in data["signal"].to_numpy()])
+    amplitude = complex_amplitudes(data)[:, 1:]
+    quantities = response_quantities(data)
+    first, reason = deciding_quantity([quantity.name for quantity in quantities], wanted)
     sizes = {quantity.name: quantity.sizes(amplitude) for quantity in quantities}
     peaks = {quantity.name: _peaks(quantity, sizes[quantity.name].max(axis=2), inside) for quantity in quantities}
     places = [
-        (place, number, quantity.name, point, line)
+        (quantity.name != first, place, number, quantity.name, point, line)
         for number, quantity in enumerate(quantities)
         for place, (point, line) in enumerate(peaks[quantity.name], start=1)
     ]
     groups: list[dict[str, tuple[int, int, int]]] = []
     of_line: dict[int, list[dict[str, tuple[int, int, int]]]] = {}
-    for place, _, name, point, line in sorted(places):
+    for _, place, _, name, point, line in sorted(places):
         others = of_line.setdefault(line, [])
         group = next((other for other in others if name not in other and _is_same_resonance(other, speed, point)), None)
         if group is None:
@@ -169,22 +226,24 @@ def ranking_of(data: xr.Dataset, speeds: tuple[float, float] | None = None) -> R
         group[name] = place, point, line
     limits = _limits(data, quantities, peaks)
     found = tuple(_resonance(data, quantities, sizes, group, limits) for group in groups)
-    return Ranking(found, (low, high), whole, _accelerating_parts(data))
+    return Ranking(found, (low, high), whole, _accelerating_parts(data), quantity=first, reason=reason)
 
 
-def resonances(data: xr.Dataset) -> pd.DataFrame:
+def resonances(data: xr.Dataset, quantity: str | None = None) -> pd.DataFrame:
     """Rank the resonances of a steady-state response within the operating range, as `exugear steady` lists them.
 
     Parameters
     ----------
     data : result of `exugear.project.Project.steady` or `exugear.steady.steady_file.steady_response`
+    quantity : ``transmission_error``, ``bearing_force`` or ``acceleration``, by which they are sorted; by default the
+        acceleration at the mounts of a flexible housing, or else the bearing force
 
     Returns
     -------
     pandas.DataFrame
-        One row a resonance, sorted by the best rank in any quantity: order, input speed, frequency; amplitude, rank
-        (empty without a peak) and bearing of each quantity, and its amplitudes with the lowest and the highest
-        plausible damping. SI units, speeds in rpm.
+        One row a resonance: order, input speed, frequency; amplitude, rank (empty without a peak) and bearing or mount
+        of each quantity, and its amplitudes with the lowest and the highest plausible damping. SI units, speeds in rpm.
+
 
     Examples
     --------
@@ -202,7 +261,7 @@ def resonances(data: xr.Dataset) -> pd.DataFrame:
     """
     import pandas as pd
 
-    table = pd.DataFrame([resonance.summary() for resonance in ranking_of(data).resonances])
+    table = pd.DataFrame([resonance.summary() for resonance in ranking_of(data, wanted=quantity).resonances])
     return table.astype({name: "Int64" for name in table if str(name).endswith("_place")})
 
 
@@ -230,9 +289,8 @@ def envelopes(data: xr.Dataset) -> dict[str, Envelope]:
 def order_amplitudes(data: xr.Dataset) -> dict[str, Floats]:
     """Amplitude (points, orders) of each order but 0, by quantity, of the bearing with the largest; speeds ascend."""
     rising = np.argsort(np.abs(data["speed"].to_numpy()), kind="stable")
-    amplitude: Floats = data["amplitude"].to_numpy()[rising, 1:].astype(np.float64)
-    quantities = quantities_of([str(name) for name in data["signal"].to_numpy()])
-    return {own.name: own.sizes(amplitude).max(axis=2) for own in quantities}
+    amplitude = complex_amplitudes(data)[rising, 1:]
+    return {own.name: own.sizes(amplitude).max(axis=2) for own in response_quantities(data)}
 
 
 Limits = Mapping[tuple[int, int, str], tuple[Limit, Limit]]
@@ -455,15 +513,15 @@ def response_spectra(
     Parameters
     ----------
     response : as `exugear.steady.steady_file.load_response` reads it, a function of speed
-    signals : the root of the summed squares of their amplitudes is taken
+    signals : components of a vector, whose largest magnitude is taken
     highest : highest drawn frequency, Hz
     reference, unit : amplitude of 0 dB, and the unit of the signals
     """
     speed, places = np.unique(np.abs(response["speed"].to_numpy()), return_index=True)
     names = [str(name) for name in response["signal"].to_numpy()]
     # Component 0 is the mean.
-    parts = response["amplitude"].to_numpy()[places, 1:][..., [names.index(name) for name in signals]]
-    amplitude = np.sqrt((parts.astype(np.float64) ** 2).sum(axis=-1))
+    components = complex_amplitudes(response)[places, 1:][..., [names.index(name) for name in signals]]
+    amplitude = vector_peak(components.astype(np.complex128))
     orders = response["order"].to_numpy()[1:]
     unknown = [abs(float(point["speed"])) for point in json.loads(response.attrs.get("not_converged", "[]"))]
     return line_spectra(speed, orders, amplitude, highest, unknown=unknown, reference=reference, unit=unit)

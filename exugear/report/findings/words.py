@@ -51,7 +51,8 @@ class QuantityLabel:
 QUANTITIES = {
     "error": QuantityLabel("Transmission error", "transmission error", "TE", "µm", 1e6),
     "force": QuantityLabel("Bearing force", "bearing force", "force", "kN", 1e-3),
-    "acceleration": QuantityLabel("Acceleration at bearings", "acceleration", "accel.", "m/s²", 1.0),
+    "acceleration": QuantityLabel("Acceleration at bearings", "acceleration at bearings", "accel.", "m/s²", 1.0),
+    "mount_acceleration": QuantityLabel("Acceleration at mounts", "acceleration at mounts", "mounts", "m/s²", 1.0),
 }
 """Labels of the quantities of a ranking."""
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -13,21 +15,20 @@ from exugear.gearbox.load_cases import static_load_in_words
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import excitations
-from exugear.report.findings.facts import MOST_WORDS, facts_of_response, sensitivities_of, shift_text, short
+from exugear.report.findings.facts import MOST_WORDS, facts_of_response, short
 from exugear.report.findings.headline import (
     Headline,
     MatchedMode,
     causes_of,
-    changes_of,
     contributions_of,
 )
 from exugear.report.findings.parameter_variations import default_place, track_mode
 from exugear.report.findings.ranking import HOUSING, SHAFTS, Envelope, Resonance
-from exugear.report.findings.words import QUANTITIES, figure_text, percentages, rounded_text
+from exugear.report.findings.words import QUANTITIES, percentages, rounded_text
 from exugear.report.pictures.png import png_address
 from exugear.report.pictures.speed_diagrams import NUMBERED, CampbellDrawing, Strips, campbell_of, strips_of
 from exugear.report.pictures.still import mode_picture
-from exugear.report.sections.changes import CHANGES_NAME, best_changes
+from exugear.report.sections.changes import CHANGES_NAME, best_changes, study_of
 from exugear.report.sections.material import Part, ReportData, model_name
 from exugear.report.web.html import Cell, Table, render
 from exugear.report.web.stage import drawn_bodies, drawn_mode
@@ -41,7 +42,9 @@ COUNTED = 1e-3
 AT_RATED = 0.005
 """Relative speed difference from the rated speed that counts as none."""
 SHOWN_ENERGIES = 3
-"""Number of listed fractions of an energy."""
+"""Number of listed fractions of an energy, and of design changes."""
+SHOWN_SHORTFALLS = 3
+"""Number of listed parts whose life falls short."""
 STRIPS = ((690.0, 350.0), (352.0, 440.0))
 """Sizes of the diagrams of amplitude for windows of desktops and phones."""
 CAMPBELL = ((1120.0, 520.0), (352.0, 420.0))
@@ -86,17 +89,18 @@ def short_section(material: ReportData) -> Part:
     curves = headline.envelopes(material.lines)
     answer: dict[str, Any] = {
         "scope": _scope(material, headline),
-        "kicker": _kicker(headline, top),
+        "kicker": _kicker(headline),
         "frequency": f"{rounded_text(top.frequency)} Hz",
         "speed": speed_text(top),
         "off_rated": _off_rated(material, top),
         "sentence": _sentence(material, headline, top, mode),
-        "quantities": [_quantity(material, headline, top, name) for name in top.amplitudes],
+        "quantities": [_quantity(material, headline, top, name) for name in _sorted_quantities(headline, top)],
         "note": _note(material, headline),
+        "ranked": f"Ranked by {QUANTITIES[headline.ranking.quantity].column}: {headline.ranking.reason}.",
         "strips": [_strips(material, headline, curves, size) for size in STRIPS if curves],
         "resonance": _resonance_box(material, headline, mode),
         "cause": _cause_box(material, top, known),
-        "remedy": _remedy_box(material, headline, top, mode, known),
+        "remedy": _remedy_box(material, headline),
         "further": list(_further(material, headline, top, curves)),
     }
     quantities = ". ".join(
@@ -106,7 +110,7 @@ def short_section(material: ReportData) -> Part:
     notes.append(f"Highest resonance: {where}. {answer['sentence']} {quantities}.")
     boxes = (("Mode", "resonance"), ("Cause", "cause"), ("Reduction", "remedy"))
     notes.extend(f"{title}: {answer[name].line}" for title, name in boxes)
-    notes.extend(f"{title}: {text}" for title, text in answer["further"])
+    notes.extend(f"{title}: {line}" for title, lines in answer["further"] for line in lines)
     return Part(
         render("short", answer=answer, speed_label=f"{material.input_words} speed / rpm"),
         title="Summary",
@@ -140,15 +144,18 @@ def _range_text(headline: Headline) -> str:
     return f"{low} to {high} rpm"
 
 
-def _kicker(headline: Headline, top: Resonance) -> str:
+def _kicker(headline: Headline) -> str:
     where = "at all computed speeds" if headline.ranking.whole else "within the operating range"
-    first = [QUANTITIES[name].column for name, own in top.amplitudes.items() if own.place == 1]
+    highest = f"Highest {QUANTITIES[headline.ranking.quantity].column}"
     if headline.ranking.without is not None:
         low, high = (rounded_text(speed / RPM) for speed in headline.ranking.without)
-        return f"No resonance within the operating range, {low} to {high} rpm. Highest at all computed speeds"
-    if len(first) == len(QUANTITIES):
-        return f"Highest resonance {where}: first in all three quantities"
-    return f"Highest resonance {where}: first in {' and '.join(first)}"
+        return f"No resonance within the operating range, {low} to {high} rpm. {highest} at all computed speeds"
+    return f"{highest} {where}"
+
+
+def _sorted_quantities(headline: Headline, resonance: Resonance) -> list[str]:
+    """Return the quantities of a resonance, that which decides the ranking first."""
+    return sorted(resonance.amplitudes, key=lambda name: name != headline.ranking.quantity)
 
 
 def _off_rated(material: ReportData, resonance: Resonance) -> str:
@@ -265,7 +272,7 @@ def _cause_box(material: ReportData, top: Resonance, known: Contributions | None
     shared = [cause for cause in causes if cause.share is not None]
     if shared:
         shares = ", ".join(f"{material.words.of(cause.pair)} {100.0 * (cause.share or 0.0):.0f} %" for cause in shared)
-        facts.append(("Contribution", shares))
+        facts.append(("Contribution to the transmission error", shares))
     overlap = f"{rounded_text(first.overlap)}"
     if first.overlap == 0.0:
         overlap += " (spur gears)"
@@ -275,63 +282,92 @@ def _cause_box(material: ReportData, top: Resonance, known: Contributions | None
     return Box(text, facts, link="gears-section")
 
 
-def _remedy_box(
-    material: ReportData, headline: Headline, top: Resonance, mode: MatchedMode | None, known: Contributions | None
-) -> Box:
-    if computed := best_changes(material.design_study, headline, SHOWN_ENERGIES):
-        changes = [(gain, material.words.labelled(words)) for gain, words in computed]
-        return Box("Transmission error at this peak, computed for each change.", changes=changes, link=CHANGES_NAME)
-    changes = []
-    for change in changes_of(material.words, known):
-        sign = "+" if change.more else "−"
-        limit = "< " * change.bounded
-        changes.append((f"{limit}−{figure_text(change.gain, 2)} dB", f"{sign}10 % {change.what}"))
-    error = top.amplitudes["error"]
-    if error.limits is not None and error.place is not None and error.limits[1].amplitude > 0.0:
-        gain = 20.0 * math.log10(error.amplitude / error.limits[1].amplitude)
-        if gain > 0.0:
-            changes.append((f"−{figure_text(gain, 2)} dB", "highest plausible damping"))
-    if changes:
-        text = "Transmission error at this peak, to first order. `exugear report --levers` computes design changes."
-        return Box(text, changes=changes, link="change" * (mode is not None))
-    if mode is None or headline.modes is None:
-        return Box("Sensitivities need modes or a steady-state response: `exugear modes`, `exugear steady`.")
-    shifts = sensitivities_of(material.words, headline.modes, mode.index)[:SHOWN_ENERGIES]
-    changes = [(shift_text(shift), f"+10 % {shift.kind} of {shift.what}") for shift in shifts]
-    text = "Frequency shifts of this mode, to first order: they move the resonance. `exugear steady` adds its height."
-    return Box(text, changes=changes, link="change")
+def _remedy_box(material: ReportData, headline: Headline) -> Box:
+    """Show the best computed changes, or the command that computes them: estimates are no advice."""
+    study = study_of(material.design_study, headline)
+    if study is None:
+        command = f"`{shlex.join(['exugear', 'report', str(material.context.folder), '--levers'])}`"
+        if headline.response is None:
+            command = f"`exugear steady`, then {command}"
+        return Box(f"Design changes are not computed: {command}. Sensitivities of the mode are no design changes.")
+    label = QUANTITIES[study.quantity]
+    changes = [(gain, material.words.labelled(words)) for gain, words in best_changes(study, SHOWN_ENERGIES)]
+    if not changes:
+        text = f"None of {len(study.results)} computed changes lowers the highest {label.column} in the range without "
+        return Box(f"{text}raising another quantity by 1 dB or failing a requirement.", link=CHANGES_NAME)
+    text = f"Highest {label.column} in the range, recomputed; no other quantity rises by more than 1 dB."
+    return Box(text, changes=changes, link=CHANGES_NAME)
 
 
 def _further(
     material: ReportData, headline: Headline, top: Resonance, curves: Mapping[str, Envelope]
-) -> Iterator[tuple[str, str]]:
-    """Yield title and text of the row of small cards."""
+) -> Iterator[tuple[str, list[str]]]:
+    """Yield title and lines of the row of small cards."""
+    if lines := list(_shortfalls(material)):
+        yield "Required life not reached", lines
+    if leaders := list(_leaders(material, headline, top)):
+        yield "Highest in other quantities", leaders
     rated = material.context.gearbox.case.operation.rated_speed_rpm
     if rated is not None and curves:
-        yield f"At rated speed, {rounded_text(rated)} rpm", _rated_text(headline, curves, rated)
+        yield f"At rated speed, {rounded_text(rated)} rpm", _rated_lines(headline, top, curves, rated)
     outside = headline.outside()
     if outside is not None:
         peaks = ", ".join(amplitude_text(name, own.amplitude) for name, own in outside.amplitudes.items())
-        yield "Just outside the range", f"{rounded_text(outside.frequency)} Hz at {speed_text(outside)}: {peaks}."
+        yield "Just outside the range", [f"{rounded_text(outside.frequency)} Hz at {speed_text(outside)}: {peaks}."]
     if doubts := list(_doubts(material, headline, top)):
-        yield "What could overturn this", short(*doubts)
+        yield "What could overturn this", [short(*doubts)]
 
 
-def _rated_text(headline: Headline, curves: Mapping[str, Envelope], rated: float) -> str:
-    parts = []
-    for name, curve in curves.items():
-        if curve.speed[0] <= rated * RPM <= curve.speed[-1]:
-            parts.append(amplitude_text(name, float(np.interp(rated * RPM, curve.speed, curve.amplitude))))
-    if not parts:
-        return "Not computed."
+def _shortfalls(material: ReportData) -> Iterator[str]:
+    """Yield the parts that fail or fall short of their requirement in a stored rating, at most `SHOWN_SHORTFALLS`."""
+    for life in material.ratings.lives:
+        lines = [line for key in ("failures", "shortfalls") for line in json.loads(life.attrs[key])]
+        for line in lines[:SHOWN_SHORTFALLS]:
+            yield f"{material.words.labelled(line)}."
+        if len(lines) > SHOWN_SHORTFALLS:
+            yield f'{len(lines) - SHOWN_SHORTFALLS} more in "Rating and life".'
+
+
+def _leaders(material: ReportData, headline: Headline, top: Resonance) -> Iterator[str]:
+    """Yield the highest resonance in each other quantity."""
+    for name in top.amplitudes:
+        leader = headline.ranking.leader(name)
+        if name == headline.ranking.quantity or leader is None:
+            continue
+        label = QUANTITIES[name]
+        if leader is top:
+            yield f"{label.title}: this resonance."
+            continue
+        own = leader.amplitudes[name]
+        order = material.words.line(material.words.order(leader.line, leader.order))
+        place = f" ({material.words.of(own.at)})" if own.at else ""
+        yield (
+            f"{label.title}: ±{rounded_text(label.factor * own.amplitude)} {label.unit}{place}, "
+            f"{rounded_text(leader.frequency)} Hz at {speed_text(leader)}, {order}."
+        )
+
+
+def _rated_lines(headline: Headline, top: Resonance, curves: Mapping[str, Envelope], rated: float) -> list[str]:
+    """Return the amplitudes at rated speed, and which of them exceed the headline."""
+    values = {
+        name: float(np.interp(rated * RPM, curve.speed, curve.amplitude))
+        for name, curve in curves.items()
+        if curve.speed[0] <= rated * RPM <= curve.speed[-1]
+    }
+    if not values:
+        return ["Not computed."]
     near = [
         number
         for number, own in enumerate(headline.ranking.resonances[:SHOWN], start=1)
         if abs(abs(own.speed) / RPM / rated - 1.0) < 2.0 * AT_RATED
     ]
+    text = ", ".join(amplitude_text(name, value) for name, value in values.items())
     at = f" Resonance {near[0]} of the ranking." if near else ""
-    text = ", ".join(parts)
-    return f"{text[0].upper()}{text[1:]}.{at}"
+    lines = [f"{text[0].upper()}{text[1:]}.{at}"]
+    if values.get(headline.ranking.quantity, 0.0) > top.amplitudes[headline.ranking.quantity].amplitude:
+        column = QUANTITIES[headline.ranking.quantity].column
+        lines.append(f"The {column} at rated speed is higher than at the highest resonance.")
+    return lines
 
 
 def _doubts(material: ReportData, headline: Headline, top: Resonance) -> Iterator[str]:
@@ -341,9 +377,10 @@ def _doubts(material: ReportData, headline: Headline, top: Resonance) -> Iterato
         same = group is not None and other.source == group.source and other.inertias != group.inertias
         first = next(iter(other.in_operation.resonances), None) if same else None
         if first is not None:
+            quantity = other.in_operation.quantity
             yield (
                 f"Inertia set {other.inertias}: {rounded_text(first.frequency)} Hz at {speed_text(first)}, "
-                f"{amplitude_text('error', first.amplitudes['error'].amplitude)}."
+                f"{amplitude_text(quantity, first.amplitudes[quantity].amplitude)}."
             )
     mode = headline.mode_of(top)
     own = next((one.variations for one in material.variations if one.choice == headline.choice), ())
@@ -359,10 +396,9 @@ def _doubts(material: ReportData, headline: Headline, top: Resonance) -> Iterato
             f"{label[0].upper()}{label[1:]} {values[0]:g} to {values[-1]:g} instead of {values[place]:g}: "
             f"{ends[0]} to {ends[1]} Hz."
         )
-    places = [peak.places for peak in top.amplitudes.values() if peak.places is not None and peak.places[0] == 1]
-    if places:
-        worst = min(place[1] for place in places)
-        yield "Damping does not change the first rank." if worst == 1 else f"Damping: rank 1 to {worst}."
+    places = top.amplitudes[headline.ranking.quantity].places
+    if places is not None:
+        yield "Damping does not change the first rank." if places[1] == 1 else f"Damping: rank 1 to {places[1]}."
 
 
 # Sections "Resonance ranking" and "Campbell diagram"
@@ -378,12 +414,12 @@ def ranking_section(material: ReportData) -> Part:
     title = f"Highest {len(rows)} resonances, {_range_text(headline)}"
     table = Table(
         rows,
-        ("excited by", "bearing", "mode shape"),
+        ("excited by", "place", "mode shape"),
         caption=title,
         name="resonances",
         sortable=True,
         stacked=True,
-        hidden=("off rated / %", "bearing", "mode"),
+        hidden=("off rated / %", "place", "mode"),
     )
     html = render(
         "ranking",
@@ -412,14 +448,15 @@ def _row(
         off = 100.0 * (rpm / rated - 1.0)
         row["off rated / %"] = Cell(f"{off:+.0f}".replace("-", "−").replace("+0", "0").replace("−0", "0"), off)
     row["excited by"] = words.line(words.order(resonance.line, resonance.order))
-    for name, own in resonance.amplitudes.items():
+    for name in _sorted_quantities(headline, resonance):
+        own = resonance.amplitudes[name]
         label = QUANTITIES[name]
         value = label.factor * own.amplitude
         largest = label.factor * max(other.amplitudes[name].amplitude for other in shown)
         row[f"{label.column} ± / {label.unit}"] = Cell(rounded_text(value), value, bar=value / largest, kind=name)
         row[f"rank, {name}"] = _number(own.place)
-        if name == "force":
-            row["bearing"] = words.of(own.at)
+        if name == headline.ranking.quantity and own.at:
+            row["place"] = words.of(own.at)
     mode = headline.mode_of(resonance)
     row["mode"] = _number(None)
     row["mode shape"] = "–"

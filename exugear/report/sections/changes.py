@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from exugear.gearbox.units import RPM
 from exugear.report.findings.context import OTHER_INPUT, Context, choice_of, model_label
 from exugear.report.findings.design_changes import (
-    ASSUMPTION,
     LEAST_DB,
     ChangeResult,
     DesignStudy,
@@ -17,6 +16,7 @@ from exugear.report.findings.design_changes import (
     settings_of_study,
 )
 from exugear.report.findings.headline import Headline
+from exugear.report.findings.proposals import ASSUMPTION
 from exugear.report.findings.words import QUANTITIES, rounded_text
 from exugear.report.sections.material import Part, ReportData
 from exugear.report.web.html import Cell, Table, render
@@ -41,9 +41,13 @@ def changes_section(material: ReportData) -> Part:
     line = next((words.line(own) for own in material.lines if own.name == study.line), words.labelled(study.line))
     html = render(
         "design_changes",
-        scope=f"Resonance: {where}, {line}. Model: {model_label(choice_of(study.model))}.",
-        designs=_table(material, designs, "Design changes", CHANGES_NAME + "-table"),
-        assumptions=_table(material, assumptions, "Other assumptions", CHANGES_NAME + "-assumptions"),
+        scope=(
+            f"Resonance {study.number}: {where}, {line}. Model: {model_label(choice_of(study.model))}. Decides: "
+            f"{QUANTITIES[study.quantity].column}. Loads: {', '.join(study.loads)}."
+        ),
+        requirements=[words.labelled(line) for line in study.requirements],
+        designs=_table(material, study, designs, "Design changes", CHANGES_NAME + "-table"),
+        assumptions=_table(material, study, assumptions, "Other assumptions", CHANGES_NAME + "-assumptions"),
         refused=[f"{words.labelled(one.change.words)}: {one.refusal}" for one in study.results if one.refusal],
     )
     return Part(html, title="Design changes", name=CHANGES_NAME)
@@ -70,28 +74,21 @@ def stored_study(context: Context) -> DesignStudy | None:
     return study
 
 
-def best_changes(study: DesignStudy | None, headline: Headline, count: int) -> list[tuple[str, str]]:
-    """Return what the best changes do to the transmission error at the resonance of a headline, and their texts.
-
-    The best ones reduce this resonance, and most of all the highest amplitude in the operating range. The list is empty
-    if the study is of another resonance or another model.
-    """
+def study_of(study: DesignStudy | None, headline: Headline) -> DesignStudy | None:
+    """Return the design changes if they are of the first resonance of the page and of its model and quantity."""
     top = headline.top
     if study is None or top is None or choice_of(study.model) != headline.choice:
-        return []
-    if study.line != top.line or abs(study.frequency - top.frequency) > 0.01 * top.frequency:
-        return []
-    lowered = [
-        (effect.this_peak, effect.highest or 0.0, result.change.words)
-        for result in study.results
-        if result.change.group != ASSUMPTION
-        and (effect := result.effects.get("error")) is not None
-        and effect.this_peak is not None
-        and effect.this_peak < 0.0
-    ]
+        return None
+    same = study.line == top.line and abs(study.frequency - top.frequency) <= 0.01 * top.frequency
+    return study if same and study.quantity == headline.ranking.quantity else None
+
+
+def best_changes(study: DesignStudy, count: int) -> list[tuple[str, str]]:
+    """Return what the best recommended changes do to the highest amplitude in the range, and their texts."""
+    best = [result for result in study.results if result.recommended][:count]
     return [
-        (_decibels(here).shown + " dB", f"{_beginning(words)}; highest in range {_decibels(highest).shown} dB")
-        for here, highest, words in lowered[:count]
+        (_decibels(result.effects[study.quantity].highest).shown + " dB", _beginning(result.change.words))
+        for result in best
     ]
 
 
@@ -100,20 +97,23 @@ def _beginning(words: str) -> str:
     return words.split(" (")[0].split(",")[0]
 
 
-def _table(material: ReportData, results: Sequence[ChangeResult], caption: str, name: str) -> Table:
+def _table(material: ReportData, study: DesignStudy, results: Sequence[ChangeResult], caption: str, name: str) -> Table:
     rows = []
     for result in results:
         row: dict[str, object] = {"change": material.words.labelled(result.change.words)}
-        for quantity, label in QUANTITIES.items():
+        for quantity, label in sorted(QUANTITIES.items(), key=lambda item: item[0] != study.quantity):
             if any(quantity in own.effects for own in results):
                 effect = result.effects.get(quantity, Effect(None, None))
                 row[f"{label.column}, this peak / dB"] = _decibels(effect.this_peak)
                 row[f"{label.column}, highest in range / dB"] = _decibels(effect.highest)
+        row["recommended"] = material.words.labelled(result.objection) or ("yes" if result.recommended else "–")
         row["price"] = material.words.labelled(result.price).replace(" -", " −") or "–"
         rows.append(row)
-    narrow = ("change", "transmission error", "price")
+    narrow = ("change", QUANTITIES[study.quantity].column, "recommended", "price")
     hidden = [key for key in (rows[0] if rows else ()) if not key.startswith(narrow)]
-    return Table(rows, ("change", "price"), caption=caption, name=name, hidden=hidden, sortable=True, stacked=True)
+    return Table(
+        rows, ("change", "recommended", "price"), caption=caption, name=name, hidden=hidden, sortable=True, stacked=True
+    )
 
 
 def _decibels(value: float | None) -> Cell:

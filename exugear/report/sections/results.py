@@ -15,6 +15,7 @@ from exugear.report.findings.result_checks import CheckResult, validity_checks
 from exugear.report.findings.words import figure_text, percentages
 from exugear.report.sections.material import Part, ReportData, group_words
 from exugear.report.web.html import Cell, Figure, Table, render
+from exugear.results.spectra.resonances import Pick
 from exugear.results.spectra.run_spectra import WINDOW_FACTORS, AbsenceRule, VariantRun
 
 
@@ -151,7 +152,8 @@ def _row(
     material: ReportData, group: RunGroup, run: VariantRun, number: int, resonance: RankedResonance
 ) -> dict[str, object]:
     finding = resonance.finding
-    peak = resonance.peak
+    # A mode has a peak for each order that excites it: the row is of the one that the panel shows.
+    peak = group.shown_peak(resonance)
     loudest = group.ranked[run.variant][0].ranking_level
     frequency = f"{finding.resonance.frequency:.0f} ± {figure_text(finding.resonance.resolution, 1)}"
     choice = f"resonance:{group.name}:{run.variant}:{number - 1}"
@@ -159,13 +161,14 @@ def _row(
     row: dict[str, object] = {
         "No.": Cell(str(number), number),
         "Frequency / Hz": Cell(frequency, finding.resonance.frequency, choice),
-        "Speed / rpm": Cell(figure_text(finding.speed, 4), finding.speed),
+        "Speed / rpm": Cell(figure_text(abs(peak.speed) / RPM, 4), abs(peak.speed) / RPM),
         "Excited by": material.words.line(peak.line),
-        "Level / dB": _level(resonance, loudest),
+        "Level / dB": _level(resonance, peak, loudest),
     }
     if run.variant in group.constant:
         row[AT_CONSTANT] = _constant_speed_cell(resonance, loudest)
-    amplitude = 10.0 ** (resonance.ranking_level / 20.0)
+    shown = resonance.ranking_level if peak is resonance.peak else peak.level
+    amplitude = 10.0 ** (shown / 20.0)
     row["± µm"] = Cell(figure_text(amplitude, 2), amplitude)
     row["Prominence / dB"] = Cell(figure_text(peak.prominence, 2), peak.prominence)
     for name, key in zip((n for n in group.runs if n != run.variant), _others(group, run.variant), strict=True):
@@ -186,10 +189,10 @@ def _row(
     return row
 
 
-def _level(resonance: RankedResonance, loudest: float) -> Cell:
-    """Return the level in the run-up; marked if the run-up is too fast."""
-    level = resonance.peak.level
-    if resonance.constant is None:
+def _level(resonance: RankedResonance, peak: Pick, loudest: float) -> Cell:
+    """Return the level of a peak in the run-up; marked if the run-up is too fast."""
+    level = peak.level
+    if resonance.constant is None or peak is not resonance.peak:
         return Cell(f"{level:.1f}", level, bar=1.0 - (loudest - level) / SHOWN_SPAN)
     if resonance.missed >= BUILT_UP:
         return Cell(f"{level:.1f} too fast", level, tag="mind")

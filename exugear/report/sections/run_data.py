@@ -12,7 +12,6 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.groups import Channel, RankedResonance, RunGroup, channels_of, dominant_order
-from exugear.report.findings.headline import SAME_FREQUENCY
 from exugear.report.findings.ranking import TOP, ConstantSpeed
 from exugear.report.findings.words import figure_text, percentages
 from exugear.report.sections.material import ReportData, group_words, model_name
@@ -153,23 +152,9 @@ def _variant(material: ReportData, group: RunGroup, run: VariantRun) -> dict[str
 def _first(group: RunGroup, variant: str) -> int:
     """Return the place of the resonance that is chosen first: that of the ranking, or else the highest steady one."""
     ranked = group.ranked[variant]
-    leading = (number for number, own in enumerate(ranked) if _leading_peak(group, own) is not None)
+    leading = (number for number, own in enumerate(ranked) if group.is_leading(group.shown_peak(own)))
     steady = (number for number, own in enumerate(ranked) if own.steady)
     return next(leading, next(steady, 0))
-
-
-def _leading_peak(group: RunGroup, own: RankedResonance) -> Pick | None:
-    """Return the peak of a resonance that leads the ranking in the operating range, if it is one of its peaks."""
-    top = next(iter(group.in_operation.resonances), None)
-    if top is None:
-        return None
-    same = (
-        pick
-        for pick in own.finding.resonance.picks
-        if math.isclose(pick.line.order, top.order, rel_tol=1e-6)
-        and math.isclose(pick.frequency, top.frequency, rel_tol=SAME_FREQUENCY)
-    )
-    return next(same, None)
 
 
 def _highest(material: ReportData, spectra: Waterfall) -> int:
@@ -274,8 +259,7 @@ def _loudest(material: ReportData, channel: Channel) -> dict[str, Any] | None:
 
 
 def _resonance(material: ReportData, group: RunGroup, run: VariantRun, own: RankedResonance) -> dict[str, Any]:
-    # The first resonance of the ranking is shown at its speed, which may not be that of the highest peak at any speed.
-    peak = _leading_peak(group, own) or own.peak
+    peak = group.shown_peak(own)
     resonance = own.finding.resonance
     return {
         "frequency": rounded(resonance.frequency, 6),

@@ -321,14 +321,17 @@ def find_standing(values: Floats, stands: float, found: Integers) -> int:
     return count
 
 
-def predicted_top(places: Floats, values: Complexes, highest: int) -> tuple[float, float]:
+def predicted_top(
+    places: Floats, values: Complexes, highest: int, size: Callable[[Complexes], Floats]
+) -> tuple[float, float]:
     """Place and height of the top near the highest of some values, by a curve through it and its neighbours.
 
     Parameters
     ----------
     places : (n,) ascending, five or more
-    values : (n, signals) the height is the root of their summed squares; all have the same poles
+    values : (n, signals) all have the same poles
     highest : which is the highest, neither the first nor the last
+    size : returns the heights (n,) of values (n, signals)
 
     Notes
     -----
@@ -341,18 +344,21 @@ def predicted_top(places: Floats, values: Complexes, highest: int) -> tuple[floa
     One resonance, whose top lies between two places:
 
     >>> x = np.array([0.9, 0.95, 0.99, 1.02, 1.06])
-    >>> place, height = predicted_top(x, 0.02 / (1.0 - x**2 + 0.02j * x)[:, None], 2)
+    >>> values = 0.02 / (1.0 - x**2 + 0.02j * x)
+    >>> place, height = predicted_top(x, values[:, None], 2, lambda own: np.abs(own[:, 0]))
     >>> round(place, 4), round(height, 4)
     (0.9999, 1.0001)
     """
-    found = [float(places[highest]), float(np.linalg.norm(values[highest]))]
+    found = [float(places[highest]), float(size(values)[highest])]
     # Where curves through other neighbours differ, the highest is to be looked at.
     for first in range(max(highest - 3, 0), min(highest, len(places) - NEIGHBOURS + 1)):
-        found = max(found, list(_top(places, values, highest, first)), key=lambda own: own[1])
+        found = max(found, list(_top(places, values, highest, first, size)), key=lambda own: own[1])
     return found[0], found[1]
 
 
-def _top(places: Floats, values: Complexes, highest: int, first: int) -> tuple[float, float]:
+def _top(
+    places: Floats, values: Complexes, highest: int, first: int, size: Callable[[Complexes], Floats]
+) -> tuple[float, float]:
     """Place and height of the top near a place by the curve through five places from one on."""
     middle = places[highest]
     width = places[highest + 1] - places[highest - 1]
@@ -366,11 +372,11 @@ def _top(places: Floats, values: Complexes, highest: int, first: int) -> tuple[f
     def heights(at: Floats) -> Floats:
         apart = at[:, None] - carrying
         parts = weights / np.where(apart == 0.0, NODE_DISTANCE, apart)
-        return np.asarray(np.linalg.norm((parts @ f[SUPPORT]) / parts.sum(axis=1)[:, None], axis=1))
+        return size((parts @ f[SUPPORT]) / parts.sum(axis=1)[:, None])
 
     low, high = ((places[highest + side] - middle) / width for side in (-1, 1))
     top = 0.0
-    height = float(np.linalg.norm(values[highest]))
+    height = float(size(values)[highest])
     for _ in range(CLOSER):
         at = np.linspace(low, high, LOOKED_AT)
         found = heights(at)

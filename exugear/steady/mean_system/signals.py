@@ -2,13 +2,13 @@
 
 Bearings of planets have multi-blade components, along radius and tangent, as the planets themselves.
 
-The force of a bearing has three parts, and for planets three multi-blade components as well: for each order it is the
-rms value over the planets, along all axes. Of several bearings the largest counts.
+The amplitude of a force or an acceleration on an order is the largest magnitude of its vector, whose tip moves along an
+ellipse. For planets it is the rms value over the planets. Of several bearings the largest counts.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -109,7 +109,15 @@ def carried_seats(assembly: Assembly) -> dict[str, bool]:
     This applies where the supporting body is flexible, such as a housing; otherwise it is the acceleration of the
     shaft.
     """
-    return {support.family: carried for support, carried in zip(assembly.supports, _carried(assembly), strict=True)}
+    mounts = mount_names(assembly)
+    carried = zip(assembly.supports, _carried(assembly), strict=True)
+    return {support.family: own for support, own in carried if support.name not in mounts}
+
+
+def mount_names(assembly: Assembly) -> tuple[str, ...]:
+    """Return the names of the supports that are mounts; all others are bearings."""
+    mounts = {mount.name for mount in assembly.gearbox.mounts}
+    return tuple(support.name for support in assembly.supports if support.name in mounts)
 
 
 def _carried(assembly: Assembly) -> list[bool]:
@@ -170,8 +178,7 @@ def _support_waves(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> tuple[Flo
     return turn, labels
 
 
-# The three quantities that describe a steady-state response: transmission error, bearing force, acceleration at
-# bearings
+# The quantities that describe a steady-state response: transmission error, bearing force, accelerations
 
 MEAN_OF_OTHERS = 0.5
 """Mean square over the planets of each multi-blade component, except for the common one."""
@@ -179,66 +186,88 @@ ALTERNATING = "alternating"
 """The wave that changes its sign from planet to planet: its square is the same at all."""
 
 
+def vector_peak(components: Complexes) -> Floats:
+    """Return the largest magnitude (...) of vectors whose components (..., axes) oscillate at one frequency.
+
+    The tip of Re(a exp(i w t)) moves along an ellipse, whose larger semi-axis is sqrt((|a|^2 + |a . a|) / 2). The root
+    of the summed squares, |a|, exceeds it by up to a factor of sqrt(2), for a vector that rotates.
+
+    Examples
+    --------
+    A rotating vector, and one along a fixed line:
+
+    >>> vector_peak(np.array([[1.0, 1.0j, 0.0], [3.0, 4.0, 0.0]]))
+    array([1., 5.])
+    """
+    squares = (np.abs(components) ** 2).sum(axis=-1)
+    return np.asarray(np.sqrt(0.5 * (squares + np.abs((components**2).sum(axis=-1)))))
+
+
 @dataclass(frozen=True, eq=False)
 class Quantity:
     """One of the quantities, and what it is made of."""
 
     name: str
-    """``error``, ``force`` or ``acceleration``."""
+    """One of `SIGNALS`."""
     units: str
     places: tuple[str, ...]
-    """Bearings, of planets their family; of the transmission error one place without a name."""
+    """Bearings or mounts, of planets their family; of the transmission error one place without a name."""
     signals: tuple[Integers, ...]
-    """(k,) signals of each place."""
+    """(waves, axes) signals of each place."""
     weights: tuple[Floats, ...]
-    """(k,) what they count, as factors of their amplitudes."""
+    """(waves,) mean square over the planets of each multi-blade component."""
 
-    def at(self, amplitude: Complexes | SingleComplexes, place: int) -> Complexes:
-        """Weighted amplitudes (..., k) at a place from those of all signals (..., signals)."""
-        return np.asarray(amplitude[..., self.signals[place]] * self.weights[place])
+    def components(self, amplitude: Complexes | SingleComplexes, place: int) -> Complexes:
+        """Return the complex amplitudes (..., waves * axes) of a place from those of all signals (..., signals)."""
+        return np.asarray(amplitude[..., self.signals[place].ravel()], dtype=np.complex128)
 
-    def sizes(self, amplitude: Complexes | SingleComplexes | Floats) -> Floats:
-        """Size (..., places) at each place from the amplitudes (..., signals) of all signals, complex or not."""
-        own = [
-            np.linalg.norm(amplitude[..., signals] * weights, axis=-1)
-            for signals, weights in zip(self.signals, self.weights, strict=True)
-        ]
-        return np.stack(own, axis=-1)
+    def size(self, components: Complexes, place: int) -> Floats:
+        """Return the amplitude (...) of a place from its `components`."""
+        vectors = components.reshape(*components.shape[:-1], *self.signals[place].shape)
+        return np.asarray(np.sqrt(vector_peak(vectors) ** 2 @ self.weights[place]))
+
+    def sizes(self, amplitude: Complexes | SingleComplexes) -> Floats:
+        """Return the amplitudes (..., places) from the complex amplitudes (..., signals) of all signals."""
+        return np.stack([self.size(self.components(amplitude, n), n) for n in range(len(self.places))], axis=-1)
 
 
 SIGNALS = {
     "error": ("overall_dte", "m"),
     "force": ("support_force", "N"),
     "acceleration": ("seat_acceleration", "m/s2"),
+    "mount_acceleration": ("seat_acceleration", "m/s2"),
 }
 """Signals of each quantity and their units."""
 
 
-def quantities_of(names: Sequence[str]) -> tuple[Quantity, ...]:
-    """Find the quantities among signals; a gearbox without bearings has no force and no acceleration.
+def quantities_of(names: Sequence[str], mounts: Collection[str]) -> tuple[Quantity, ...]:
+    """Find the quantities among signals; a gearbox without bearings or mounts has no forces and accelerations there.
 
     Parameters
     ----------
     names : of the signals, as `exugear.steady.mean_system.signals.SignalName` has them
+    mounts : names of the mounts of the housing; all other supports are bearings
 
     Examples
     --------
     >>> names = ["overall_dte", *(f"support_force pin_a{wave} radial" for wave in (" mean", " cosine", " sine"))]
-    >>> error, force = quantities_of(names)
+    >>> error, force = quantities_of(names, ())
     >>> force.places, float(force.sizes(np.array([0.0, 3.0, 4.0, 4.0]))[0])
     (('pin_a',), 5.0)
     """
     found = []
     for quantity, (signal, units) in SIGNALS.items():
-        places: dict[str, list[tuple[int, float]]] = {}
+        places: dict[str, dict[str, list[int]]] = {}
         for at, name in enumerate(names):
             kind, _, rest = name.partition(" ")
-            if kind == signal:
-                place, *wave = rest.split(" ")[:-1] or [""]
-                shared = not wave or wave[0] in ("mean", ALTERNATING)
-                places.setdefault(place, []).append((at, 1.0 if shared else float(np.sqrt(MEAN_OF_OTHERS))))
+            place, *wave = rest.split(" ")[:-1] or [""]
+            if kind == signal and (quantity == "error" or (place in mounts) == quantity.startswith("mount")):
+                places.setdefault(place, {}).setdefault(" ".join(wave), []).append(at)
         if places:
-            signals = tuple(np.array([at for at, _ in own]) for own in places.values())
-            weights = tuple(np.array([weight for _, weight in own]) for own in places.values())
+            signals = tuple(np.array([*waves.values()]) for waves in places.values())
+            weights = tuple(
+                np.array([1.0 if wave in ("", "mean", ALTERNATING) else MEAN_OF_OTHERS for wave in waves])
+                for waves in places.values()
+            )
             found.append(Quantity(quantity, units, tuple(places), signals, weights))
     return tuple(found)

@@ -10,9 +10,8 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.report.findings.ranking import ranking_of
 from exugear.steady.damping_band import damping_limits
 from exugear.steady.mean_system.mean_system import mean_modes, mean_system
-from exugear.steady.mean_system.signals import quantities_of
 from exugear.steady.settings import SpeedRange, SteadySettings
-from exugear.steady.steady_file import steady_response
+from exugear.steady.steady_file import complex_amplitudes, response_quantities, steady_response
 from exugear.system.build import assemble
 
 SPEEDS = SpeedRange.from_text("11:28:60")
@@ -23,7 +22,7 @@ def response(gearbox: Gearbox, stiffness: dict, method: str, variant: str = "bus
 
 
 def sizes_of(data, quantity, line: int) -> np.ndarray:
-    return quantity.sizes(data["amplitude"].to_numpy()[:, line].astype(float)).max(axis=1)
+    return quantity.sizes(complex_amplitudes(data)[:, line]).max(axis=1)
 
 
 @pytest.mark.validation
@@ -35,7 +34,7 @@ def test_peaks_at_both_ends_are_those_of_whole_responses(grc: Gearbox, stiffness
     data = response(grc.varied({"damping": modal}), stiffness, method)
     whole = [response(grc.varied({"damping": {"modal_percent": end}}), stiffness, method) for end in (1.0, 4.0)]
     points, lines, found = (data[name].to_numpy() for name in ("band_point", "band_line", "band_amplitude"))
-    quantities = quantities_of([str(name) for name in data["signal"].to_numpy()])
+    quantities = response_quantities(data)
     speed = data["speed"].to_numpy()
     errors = []
     for number, quantity in enumerate(quantities):

@@ -51,7 +51,7 @@ def dense_peaks(assembly, speeds, harmonics, count, most):
         amplitude = 2.0 * signals(model, solver.response(sense * speed))[1:]
         return [own.sizes(amplitude).max(axis=1) for own in quantities]
 
-    quantities = quantities_of([own.name for own in model.signal_names])
+    quantities = model.quantities
     at = np.geomspace(abs(speeds.first), abs(speeds.last), count)
     swept = [np.array(own) for own in zip(*(sizes(speed) for speed in at), strict=True)]
     found = {}
@@ -75,7 +75,7 @@ def differences(response, truth):
     """Relative difference of each peak of a dense sweep from the one that is listed near it, 1 where none is."""
     speed = np.abs(response.solved.speed)
     found = {}
-    for quantity in quantities_of([own.name for own in response.signals]):
+    for quantity in quantities_of([own.name for own in response.signals], ()):
         sizes = quantity.sizes(response.solved.amplitude[:, 1:]).max(axis=2)
         own = []
         for line, at, height in truth[quantity.name]:

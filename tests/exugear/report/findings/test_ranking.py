@@ -14,7 +14,7 @@ from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.units import RPM
 from exugear.report.findings.ranking import HOUSING, SHAFTS, envelopes, order_amplitudes, ranking_of, resonances
 from exugear.report.pictures.diagrams import plot_response
-from exugear.steady.mean_system.signals import quantities_of
+from exugear.steady.mean_system.signals import quantities_of, vector_peak
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import to_dataset
 from exugear.steady.steady_response import response_of
@@ -40,6 +40,7 @@ def response(operation, carried=False):
         {
             "speed": ("point", -SPEED),
             "amplitude": (("point", "line", "signal"), amplitude),
+            "phase": (("point", "line", "signal"), np.zeros_like(amplitude)),
             "index": (("line", "base"), np.array([[0], [1], [2]])),
             "order": ("line", np.array([0.0, 10.0, 20.0])),
             # Of two peaks: the force of the second line is the higher one, and with little damping that of the first.
@@ -51,18 +52,18 @@ def response(operation, carried=False):
             ),
         },
         {"quantity": ["error", "force", "acceleration"], "signal": list(SIGNALS), "base": ["mesh"]},
-        {"operating_range": json.dumps(operation), "carried_seats": json.dumps({"brg": carried})},
+        {"operating_range": json.dumps(operation), "carried_seats": json.dumps({"brg": carried}), "mounts": "[]"},
     )
 
 
-def test_three_quantities_stand_side_by_side_and_the_best_place_in_any_comes_first():
-    ranking = ranking_of(response(None))
+def test_resonances_are_sorted_by_the_chosen_quantity_and_have_their_rank_in_each():
+    ranking = ranking_of(response(None), wanted="transmission_error")
     assert ranking.whole and ranking.accelerates == SHAFTS
-    first, second, third = ranking.resonances
+    first, third, second = ranking.resonances
     assert (first.line, first.best, second.line, second.best) == ("mesh", 1, "2 x mesh", 1)
     assert (first.amplitudes["error"].place, first.amplitudes["force"].place) == (1, 2)
     assert first.amplitudes["acceleration"].place is None
-    assert second.frequency == pytest.approx(20.0 * 3.99 / (2.0 * np.pi))
+    assert second.frequency == pytest.approx(20.0 * 4.0 / (2.0 * np.pi))  # where the deciding quantity is highest
     assert second.amplitudes["force"].amplitude == pytest.approx(50.0, rel=1e-6)  # 30, 40 and 50: Pythagoras
     assert {name: own.place for name, own in second.amplitudes.items()} == {"error": 3, "force": 1, "acceleration": 1}
     assert (third.line, third.best, third.speed) == ("2 x mesh", 2, pytest.approx(-1.5))
@@ -72,14 +73,50 @@ def test_three_quantities_stand_side_by_side_and_the_best_place_in_any_comes_fir
     assert third.amplitudes["error"].limits is None and third.amplitudes["error"].places is None
 
 
+@pytest.mark.parametrize(
+    ("wanted", "quantity", "first"),
+    [(None, "force", "2 x mesh"), ("bearing_force", "force", "2 x mesh"), ("transmission_error", "error", "mesh")],
+)
+def test_the_bearing_force_decides_by_default_and_any_quantity_by_choice(wanted, quantity, first):
+    ranking = ranking_of(response(None), wanted=wanted)
+    assert (ranking.quantity, ranking.resonances[0].line) == (quantity, first)
+    assert ranking.leader("error").line == "mesh"
+    assert ranking.leader("force").line == "2 x mesh"
+
+
+def test_mounts_are_told_from_bearings_and_decide_by_default():
+    """The foot of a housing has the highest acceleration; that at bearings is another one, at another speed."""
+    data = response(None).reindex(quantity=["error", "force", "acceleration", "mount_acceleration"], fill_value=0.0)
+    foot = [name.replace(" brg ", " foot ") for name in SIGNALS[1:]]
+    of_foot = data.isel(signal=slice(1, None)).assign_coords(signal=foot)
+    of_foot = of_foot.assign(amplitude=3.0 * of_foot["amplitude"].roll(point=7))
+    both = xr.concat([data, of_foot], "signal", data_vars="minimal").assign_attrs(mounts=json.dumps(["foot"]))
+    ranking = ranking_of(both)
+    first = ranking.resonances[0]
+    assert (ranking.quantity, first.amplitudes["mount_acceleration"].at) == ("mount_acceleration", "foot")
+    assert first.amplitudes["mount_acceleration"].amplitude == pytest.approx(21.0, rel=1e-6)
+    assert ranking.leader("acceleration").amplitudes["acceleration"].amplitude == pytest.approx(7.0, rel=1e-6)
+    assert ranking.leader("force").amplitudes["force"].at == "brg"  # forces of mounts are no bearing forces
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_amplitude_of_a_vector_is_its_largest_magnitude_over_a_period(seed):
+    vector = np.random.default_rng(seed).normal(size=(3, 2)) @ (1.0, 1.0j)
+    angle = np.linspace(0.0, 2.0 * np.pi, 20001)
+    magnitude = np.linalg.norm(np.real(vector[:, None] * np.exp(1j * angle)), axis=0)
+    assert vector_peak(vector) == pytest.approx(magnitude.max(), rel=1e-7)
+    assert vector_peak(vector) <= np.linalg.norm(vector)
+
+
 def test_the_table_of_resonances_has_their_places_and_amplitudes():
     table = resonances(response(None))
     rows = [own.summary() for own in ranking_of(response(None)).resonances]
-    assert table["line"].to_list() == [row["line"] for row in rows] == ["mesh", "2 x mesh", "2 x mesh"]
+    assert table["line"].to_list() == [row["line"] for row in rows] == ["2 x mesh", "mesh", "2 x mesh"]
     assert table["force_N"].to_list() == [row["force_N"] for row in rows]
-    assert table["speed_rpm"].to_list() == pytest.approx([-2.0 / RPM, -3.99 / RPM, -1.5 / RPM])
-    assert [table["acceleration_place"].isna()[n] for n in range(3)] == [True, False, True]
+    assert table["speed_rpm"].to_list() == pytest.approx([-3.99 / RPM, -2.0 / RPM, -1.5 / RPM])
+    assert [table["acceleration_place"].isna()[n] for n in range(3)] == [False, True, True]
     assert table["force_places_over_damping"][0] == (1, 2)
+    assert resonances(response(None), "transmission_error")["line"].to_list() == ["mesh", "2 x mesh", "2 x mesh"]
 
 
 @pytest.mark.parametrize(("quantity", "factor"), [("error", 1e6), ("force", 1e-3), ("acceleration", 1.0)])
@@ -123,8 +160,8 @@ def test_forces_of_planets_are_the_mean_square_over_them():
     theta = 2.0 * np.pi * np.arange(3) / 3
     planets = waves[0] + waves[1] * np.cos(theta) + waves[2] * np.sin(theta)
     names = [f"support_force pin{wave} radial" for wave in (" mean", " cosine", " sine")]
-    (force,) = quantities_of(names)
-    assert force.sizes(np.abs(waves))[0] == pytest.approx(np.sqrt(np.mean(np.abs(planets) ** 2)), rel=1e-12)
+    (force,) = quantities_of(names, ())
+    assert force.sizes(waves)[0] == pytest.approx(np.sqrt(np.mean(np.abs(planets) ** 2)), rel=1e-12)
 
 
 def test_the_range_of_operation_is_stated_or_follows_from_the_rated_speed(grc):
@@ -146,7 +183,9 @@ def test_the_ranking_of_the_grc_is_of_its_speeds_of_operation_and_of_shafts(grc,
     low, high = operating_range(grc)
     assert (ranking.speeds, ranking.whole, ranking.accelerates) == ((low, high), False, SHAFTS)
     assert all(low <= -own.speed <= high for own in ranking.resonances)
-    assert [own.best for own in ranking.resonances] == sorted(own.best for own in ranking.resonances)
+    ranks = [own.amplitudes["force"].place for own in ranking.resonances]
+    ranked = [rank for rank in ranks if rank is not None]
+    assert ranks == list(range(1, len(ranked) + 1)) + [None] * (len(ranks) - len(ranked))
     for quantity in ("error", "force", "acceleration"):
         found = {own.amplitudes[quantity].place: own.amplitudes[quantity].amplitude for own in ranking.resonances}
         placed = [found[place] for place in sorted(place for place in found if place is not None)]

@@ -1,0 +1,81 @@
+"""Margins of a rating: smallest safety factors and shortest bearing life, each next to its requirement."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from exugear.gearbox.sections.loads import RatingSection
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+SAME = 0.005
+"""Relative change of a margin up to which it counts as unchanged."""
+
+
+@dataclass(frozen=True)
+class Margin:
+    """Smallest value of a rating over all parts."""
+
+    value: float
+    required: float
+    part: str
+    """Part that has it."""
+    unit: str = ""
+
+
+def margins_of(data: xr.Dataset, rating: RatingSection) -> dict[str, Margin]:
+    """Return the margins of a rating by their name.
+
+    Parameters
+    ----------
+    data : as `exugear.life.life_file.read_life` returns it
+    rating : with the required safety factors; the required life is that of the load spectrum
+    """
+    hours = float(data["hours"].sum())
+    found = {
+        "S_H": _smallest(data, "flank", ("contact_safety", "contact_static"), rating.minimum_S_H),
+        "S_F": _smallest(data, "flank", ("root_safety", "root_static"), rating.minimum_S_F),
+        "shortest bearing life": _smallest(
+            data, "bearing", ("basic_hours", "reference_hours", "modified_hours"), hours, "h"
+        ),
+        "S_0": _smallest(data, "bearing", ("static_safety",), rating.minimum_S_0),
+    }
+    return {name: margin for name, margin in found.items() if margin is not None}
+
+
+def _smallest(data: xr.Dataset, kind: str, names: tuple[str, ...], required: float, unit: str = "") -> Margin | None:
+    values = np.array([data[f"{kind}_{name}"].to_numpy() for name in names], dtype=np.float64)
+    if not np.isfinite(values).any():
+        return None
+    _, part = np.unravel_index(int(np.nanargmin(values)), values.shape)
+    return Margin(float(np.nanmin(values)), required, str(data[kind].to_numpy()[part]), unit)
+
+
+def shortfalls_of(data: xr.Dataset) -> list[str]:
+    """Return the parts of a rating that fail or fall short of a requirement, as sentences."""
+    return [line for key in ("failures", "shortfalls") for line in json.loads(data.attrs[key])]
+
+
+def margins_in_words(before: Mapping[str, Margin], after: Mapping[str, Margin]) -> str:
+    """Describe how margins change, each next to its requirement; unchanged ones are omitted.
+
+    Examples
+    --------
+    >>> margins_in_words({"S_H": Margin(0.971, 1.0, "pinion")}, {"S_H": Margin(0.891, 1.0, "pinion")})
+    'S_H 0.971 to 0.891 (1 required)'
+    """
+    changes = []
+    for name, margin in after.items():
+        old = before.get(name)
+        if old is None or old.value == margin.value or abs(margin.value / old.value - 1.0) <= SAME:
+            continue
+        unit = f" {margin.unit}" if margin.unit else ""
+        form = ",.0f" if margin.unit else ".3g"
+        changes.append(f"{name} {old.value:{form}} to {margin.value:{form}}{unit} ({margin.required:{form}} required)")
+    return "; ".join(changes)
