@@ -30,7 +30,9 @@ from exugear.steady.steady_file import settings_of
 from exugear.system.tooth_mesh.laws.registry import LAWS
 
 SAME_FREQUENCY = 0.01
-"""Relative frequency difference within which a mode belongs to a resonance."""
+"""Relative frequency difference within which a mode belongs to a resonance; its damping ratio, which is half of the
+half-power bandwidth over the frequency, where that is larger.
+"""
 SAME_SPEED = 0.01
 """Relative speed difference within which an order crosses the mode of a resonance."""
 BEYOND = (0.75, 1.5)
@@ -91,7 +93,8 @@ class Headline:
         frequency = resonance.frequency if crossed is None else float(crossed["frequency"])
         frequencies = self.modes["frequency"].to_numpy()
         index = int(np.argmin(np.abs(frequencies - frequency)))
-        return index if abs(frequencies[index] - frequency) <= SAME_FREQUENCY * frequency else None
+        width = max(SAME_FREQUENCY, float(self.modes["damping_ratio"][index]))
+        return index if abs(frequencies[index] - frequency) <= width * frequency else None
 
     def mode_name(self, resonance: Resonance) -> str:
         """Return the description of the mode that a response without a file of modes crosses; empty if unknown."""
