@@ -11,6 +11,7 @@ with one has the damping times.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -22,6 +23,7 @@ from exugear.gearbox.sections.case import DampingSection
 from exugear.gearbox.variant import VariantError
 from exugear.system.bearings.stiffness import equally_spaced, planet_families
 from exugear.system.kernels.modal_damping import ModalArrays
+from exugear.system.kernels.products import laid_out, symmetric_tiles
 from exugear.system.statics import RIGID_BODY_LIMIT, linearise, static_state
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Floats
@@ -170,11 +172,10 @@ def _arrays(assembly: Assembly, columns: Floats) -> ModalArrays:
     spins = [assembly.spin.get(str(planets[0].carrier), -1) for planets in sets]
     planets = [planet for family in sets for planet in family]
     return ModalArrays(
-        columns=np.ascontiguousarray(columns),
-        rows=np.ascontiguousarray(columns.T),
+        tiles=laid_out([symmetric_tiles(columns @ columns.T)])[0],
         frame=np.array(spins, dtype=np.int64),
         first=np.cumsum([0, *map(len, sets)]).astype(np.int64),
         planets=np.array([assembly.coordinates[planet.name] for planet in planets], dtype=np.int64).reshape(-1, 6),
-        place=np.array([planet.orbit_angle for planet in planets], dtype=np.float64),
+        place=np.array([(math.cos(p.orbit_angle), math.sin(p.orbit_angle)) for p in planets]).reshape(-1, 2),
         equal=np.array([int(equally_spaced(family)) for family in sets], dtype=np.int64),
     )
