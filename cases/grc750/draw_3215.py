@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 import search_3215 as search
-from one_variant import grc_project
+from published import published_project
 
 from exugear import Choice, Gearbox, Project, SpeedRange, SteadySettings, eigenmodes, steady_response
 from exugear.gearbox.units import RPM
@@ -138,7 +138,7 @@ def draw_nearest_mode(project: Project, gearbox: Gearbox, inertias: str, frequen
 
 def main() -> None:
     """Draw what was found."""
-    project = grc_project(Choice("bushing"))
+    project = published_project(Choice("bushing"))
     project.tables()
     found = search.candidates(search.search(project))
     draw_map(found, project.folder / "search-3215-map.png")

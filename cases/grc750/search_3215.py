@@ -5,7 +5,7 @@
 The reference found a peak of the overall transmission error at 3215 Hz with compliant bearings, and none with rigid
 ones. What it assumed is not printed. This varies what had to be assumed here: radial stiffness of the planet bearings
 with housing factor, or one stiffness for all bearings; and with either the inertia set, spin inertia and mass of the
-high-speed shaft, and stiffness of the brake coupling.
+high-speed shaft, and stiffness of the brake coupling. The damping is that of `published.py`, not that of the file.
 
 For each set of the others, every bearing stiffness within the range that makes 3215 Hz a natural frequency is found
 exactly: stiffness matrices are linear in it, so that these are eigenvalues. There the response to the static
@@ -13,8 +13,9 @@ transmission errors tells how far each mesh order, up to the fifth harmonic and 
 within 10 % of the frequency, at a peak within 2 % of it in `bushing` and anywhere within 10 % in `rigid`. The mean
 system is that at half the speed.
 
-Lines go to search-3215.jsonl in the results folder, one set each; a search that is stopped goes on there. Tables
-of the case are computed first where they are missing. `draw_3215.py` draws what was found.
+Lines go to search-3215.jsonl in the results folder (results/grc750-published without one), one set each; a search that
+is stopped goes on there. Tables of the case are computed first where they are missing. `draw_3215.py` draws what was
+found.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg
-from one_variant import grc_project
+from published import published_project
 
 from exugear import Choice, Gearbox, Project, assemble
 from exugear.steady.excitation import HarmonicBalanceModel
@@ -275,7 +276,7 @@ def candidates(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def main() -> None:
     """Search, and print what was found."""
-    project = grc_project(Choice("bushing"))
+    project = published_project(Choice("bushing"))
     project.tables()
     found = candidates(search(project))
     for kind in RANGES:

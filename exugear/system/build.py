@@ -21,7 +21,7 @@ from exugear.system.kernels.coordinates import InertiaArrays, SpringArrays
 from exugear.system.kernels.elastic import ElasticArrays, no_elastic
 from exugear.system.kernels.rolling import no_rolling
 from exugear.system.kernels.turning import TravellingArrays, no_travelling
-from exugear.system.modal_damping import with_modal_damping
+from exugear.system.modal_damping import with_damping_times, with_modal_damping
 from exugear.system.operating_points import linearise_at_static_load
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.contact_state import ContactState
@@ -85,6 +85,8 @@ def assemble(
     if only_rolls and not variant.spins_only:
         raise VariantError(f"mesh model {law}: a kinematic constraint, which requires the variant rigid, not {variant}")
     flexible = _chosen_bodies(elastic, bodies or {})
+    if any(body.reduced.frame == "carrier" for body in flexible.values()):
+        gearbox = with_damping_times(gearbox)
     rigid = [body for body in moving if body.name not in flexible]
     six = [body for body in rigid if not (variant.spins_only or body.spin_only)]
     alone = [body for body in rigid if body not in six]

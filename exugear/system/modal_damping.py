@@ -5,21 +5,25 @@ flexible bodies (`body_time_s`), count towards the stated ratio: modal damping a
 has the stated damping ratio, or more where these dampers alone exceed it.
 
 Modes are those at the static load, as `exugear modes` lists them; with flexible bodies, those within their frequency
-band (`elasticity.band_Hz`).
+band (`elasticity.band_Hz`). A flexible carrier turns with its planets, so that modes have no constant shapes; a model
+with one has the damping times.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import scipy.linalg
 
 from exugear.gearbox.body_parts import damping_times
+from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.sections.case import DampingSection
 from exugear.gearbox.variant import VariantError
 from exugear.system.bearings.stiffness import equally_spaced, planet_families
 from exugear.system.kernels.modal_damping import ModalArrays
+from exugear.system.kernels.products import laid_out, symmetric_tiles
 from exugear.system.statics import RIGID_BODY_LIMIT, linearise, static_state
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Floats
@@ -40,18 +44,13 @@ def with_modal_damping(assembly: Assembly, percent: float | None = None) -> Asse
     Raises
     ------
     VariantError
-        Flexible bodies rotate with planets, or no mode is near a frequency of `modal_modes`.
+        No mode is near a frequency of `modal_modes`.
     """
     section = assembly.gearbox.case.damping
     if section.modal_percent is None:
         return assembly
     if percent is not None:
         section = DampingSection(modal_percent=percent)
-    if assembly.turning:
-        raise VariantError(
-            f"damping.modal_percent: the flexible body {next(iter(assembly.turning))} turns with planets, so the modes "
-            "have no constant shapes; use damping times, or set its flexibility = 'none'"
-        )
     q = static_state(assembly).q
     linear = linearise(assembly, q)
     modes = real_modes(linear.mass, linear.total_stiffness, assembly.motions)
@@ -69,6 +68,21 @@ def with_modal_damping(assembly: Assembly, percent: float | None = None) -> Asse
     carried = linear.mass @ rolling
     columns -= carried @ np.linalg.solve(rolling.T @ carried, rolling.T @ columns)
     return replace(assembly, modal=_arrays(assembly, columns))
+
+
+def with_damping_times(gearbox: Gearbox) -> Gearbox:
+    """Return a gearbox whose damping is proportional to stiffness, by the damping times of its file or their defaults.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> damping_in_words(with_damping_times(gearbox).case.damping)
+    'in proportion to stiffness: bearings 4 µs, meshes 4 µs, couplings 4 µs'
+    """
+    if gearbox.case.damping.modal_percent is None:
+        return gearbox
+    kept = {key: value for key, value in gearbox.content["damping"].items() if not key.startswith("modal_")}
+    return gearbox.varied({"damping": kept})
 
 
 def _rolling(assembly: Assembly) -> Floats:
@@ -158,11 +172,10 @@ def _arrays(assembly: Assembly, columns: Floats) -> ModalArrays:
     spins = [assembly.spin.get(str(planets[0].carrier), -1) for planets in sets]
     planets = [planet for family in sets for planet in family]
     return ModalArrays(
-        columns=np.ascontiguousarray(columns),
-        rows=np.ascontiguousarray(columns.T),
+        tiles=laid_out([symmetric_tiles(columns @ columns.T)])[0],
         frame=np.array(spins, dtype=np.int64),
         first=np.cumsum([0, *map(len, sets)]).astype(np.int64),
         planets=np.array([assembly.coordinates[planet.name] for planet in planets], dtype=np.int64).reshape(-1, 6),
-        place=np.array([planet.orbit_angle for planet in planets], dtype=np.float64),
+        place=np.array([(math.cos(p.orbit_angle), math.sin(p.orbit_angle)) for p in planets]).reshape(-1, 2),
         equal=np.array([int(equally_spaced(family)) for family in sets], dtype=np.int64),
     )

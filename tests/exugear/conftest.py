@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from exugear.gearbox.gearbox import Gearbox
+from exugear.system.modal_damping import with_damping_times
 from exugear.system.tooth_mesh.element import MeshCurve
 
 from .cases.contact import curves_of
@@ -19,13 +20,18 @@ CASE = Path(__file__).parents[2] / "cases" / "grc750" / "gearbox.toml"
 
 @pytest.fixture(scope="session")
 def grc() -> Gearbox:
-    return Gearbox.from_toml(CASE)
+    """The case with the damping times of its comparisons with published figures, on which these tests' numbers rest.
+
+    The file states modal damping, which has tests of its own (`test_modal_damping.py`, `test_damping_band.py`).
+    """
+    return with_damping_times(Gearbox.from_toml(CASE))
 
 
 @pytest.fixture(scope="session")
 def grc_shafts() -> Gearbox:
     """Elastic shafts only: carrier and housing rigid in every variant, so that nothing has to be meshed."""
-    return Gearbox.from_toml(CASE).varied({f"bodies.{name}.flexibility": "none" for name in ("carrier", "housing")})
+    rigid = {f"bodies.{name}.flexibility": "none" for name in ("carrier", "housing")}
+    return with_damping_times(Gearbox.from_toml(CASE)).varied(rigid)
 
 
 @pytest.fixture(scope="session")

@@ -44,7 +44,7 @@ def modes(project: WatchedProject, as_json: bool) -> None:
         print_json(summary)
     else:
         print_modes(summary)
-        damping = damping_in_words(project.gearbox.case.damping)
+        damping = damping_in_words(assembly.gearbox.case.damping)
         factor = assembly.housing_factor
         print_text(f"Linearised at the static load; housing stiffness factor {factor:g}; damping {damping}.")
         say(f"Results: {path}; Campbell diagram: {summary['picture']}")

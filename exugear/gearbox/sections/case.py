@@ -126,7 +126,8 @@ class DampingSection(Section):
     """Modal damping in percent of critical, or stiffness-proportional damping with c = time * k.
 
     `modal_percent` replaces the times of meshes, bearings and couplings. It includes the damping of dampers with
-    specified values and of flexible bodies. Measured gearboxes have 1 to 4 % at most frequencies.
+    specified values and of flexible bodies. Measured gearboxes have 1 to 4 % at most frequencies. Models with a
+    flexible body that turns with planets have the times.
     """
 
     modal_percent: q.ModalDamping | None = None

@@ -89,7 +89,8 @@ class Headline:
         frequency = resonance.frequency if crossed is None else float(crossed["frequency"])
         frequencies = self.modes["frequency"].to_numpy()
         index = int(np.argmin(np.abs(frequencies - frequency)))
-        return index if abs(frequencies[index] - frequency) <= SAME_FREQUENCY * frequency else None
+        width = max(SAME_FREQUENCY, float(self.modes["damping_ratio"][index]))
+        return index if abs(frequencies[index] - frequency) <= width * frequency else None
 
     def mode_name(self, resonance: Resonance) -> str:
         """Return the description of the mode that a response without a file of modes crosses; empty if unknown."""

@@ -145,6 +145,11 @@ def _elastic_words(material: ReportData) -> Iterator[str]:
         f"Flexible in the variant {assembly.variant}: {', '.join(parts)}; damping {1e6 * case.damping.body_time_s:g} "
         f"µs times the stiffness, modes listed up to {case.elasticity.band_Hz:g} Hz."
     )
+    if assembly.turning and case.damping.modal_percent is not None:
+        yield (
+            f"Damping in the variant {assembly.variant}: {damping_in_words(assembly.gearbox.case.damping)}, because "
+            f"{', '.join(assembly.turning)} turns with planets."
+        )
     if any(body.fixed for body in assembly.bodies):
         yield f"In the variant {assembly.variant} the flexible housing replaces the housing stiffness factor."
 

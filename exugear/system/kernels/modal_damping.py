@@ -2,7 +2,7 @@
 
 With the mass matrix M and the undamped modes phi_i of unit modal mass and angular frequency w_i at rest, the matrix
 
-    C = M Phi diag(2 zeta_i w_i) Phi^T M = B B^T
+    C = M Phi diag(2 zeta_i w_i) Phi^T M
 
 gives each mode its share zeta_i of critical damping and leaves free rolling undamped. A gearbox with planets changes
 as its carriers turn by an angle: what planet j did before is then divided among all planets i, and turned along with
@@ -11,7 +11,7 @@ them. With N equally spaced planets, a_ij the angle from planet j before to plan
     S_ij = w_ij R(a_ij),   w_ij = (1 + 2 sum_m cos(m a_ij) [+ (-1)^(i-j) for even N]) / N,
 
 which is an orthogonal matrix: the multi-blade coordinates of Coleman and Feingold (1958), NACA report 1351, written for
-the planets themselves. Damping forces are - S B B^T S^T v.
+the planets themselves. Damping forces are - S C S^T v.
 
 Numbers here become part of machine code: `fe_ste.tools.compilation` recompiles when this file changes.
 """
@@ -24,19 +24,20 @@ from typing import NamedTuple
 import numpy as np
 
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN, TILT
+from exugear.system.kernels.products import TILE, add_symmetric
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import kernel
+from fe_ste.tools.octets import SIZE, aligned_zeros
 
-MOVED, ACTING, AMOUNTS = range(3)
+MOVED, ACTING = range(2)
 """Rows of the memory of `add_modal_damping`."""
 
 
 class ModalArrays(NamedTuple):
-    """Modal damping of a system of c coordinates and n damped modes, with s sets of planets."""
+    """Modal damping of a system of c coordinates, with s sets of planets."""
 
-    columns: Floats
-    rows: Floats
-    """(c, n) and (n, c): the matrix B, and its transpose, sqrt(N s/m)."""
+    tiles: Floats
+    """The symmetric matrix C, N s/m, as `exugear.system.kernels.products.symmetric_tiles` lays it out."""
     frame: Integers
     """(s,) coordinate of the spin of each set's carrier, -1 for a carrier that does not turn."""
     first: Integers
@@ -44,18 +45,23 @@ class ModalArrays(NamedTuple):
     planets: Integers
     """(p, 6) coordinates of each planet, -1 where it has none."""
     place: Floats
-    """(p,) angle of each planet around its carrier, rad."""
+    """(p, 2) cosine and sine of the angle of each planet around its carrier."""
     equal: Integers
     """(s,) 1 for three or more equally spaced planets; other planets each take their own share along."""
 
 
 @kernel
-def share_of_planet(i: int, j: int, count: int, turned: float) -> float:
-    """Weight w_ij of planet j before in planet i now, `turned` (rad) being the angle from one to the other."""
-    # What alternates from planet to planet keeps its sign in each.
+def share_of_planet(i: int, j: int, count: int, cosine: float) -> float:
+    """Weight w_ij of planet j before in planet i now, `cosine` being that of the angle from one to the other."""
     total = 1.0
-    for m in range(1, (count - 1) // 2 + 1):
-        total += 2.0 * math.cos(m * turned)
+    before = 1.0
+    now = cosine
+    for _ in range((count - 1) // 2):
+        total += 2.0 * now
+        after = 2.0 * cosine * now - before  # cosines of multiples by Chebyshev's recurrence
+        before = now
+        now = after
+    # What alternates from planet to planet keeps its sign in each.
     if count % 2 == 0:
         total += 1.0 - 2.0 * ((i - j) % 2)
     return total / count
@@ -70,6 +76,10 @@ def turn_planets(q: Floats, modal: ModalArrays, back: bool, given: Floats, out: 
         turned = 0.0
         if modal.frame[s] >= 0:
             turned = q[modal.frame[s]]
+            if back:
+                turned = -turned
+        cosine = math.cos(turned)
+        sine = math.sin(turned)
         for a in range(count):
             to = modal.planets[begin + a]
             for axis in range(BODY_SIZE):
@@ -79,15 +89,17 @@ def turn_planets(q: Floats, modal: ModalArrays, back: bool, given: Floats, out: 
                 if modal.equal[s] == 0 and a != b:
                     continue
                 # From the place of one planet before to that of the other now; back, the other way round.
-                between = modal.place[begin + a] - modal.place[begin + b]
-                angle = between + turned
-                if back:
-                    angle = between - turned
+                own = modal.place[begin + a]
+                other = modal.place[begin + b]
+                along = own[0] * other[0] + own[1] * other[1]
+                across = own[1] * other[0] - own[0] * other[1]
+                c = along * cosine - across * sine
+                d = across * cosine + along * sine
                 weight = 1.0
                 if modal.equal[s] == 1:
-                    weight = share_of_planet(a, b, count, angle)
-                c = weight * math.cos(angle)
-                d = weight * math.sin(angle)
+                    weight = share_of_planet(a, b, count, c)
+                c *= weight
+                d *= weight
                 of = modal.planets[begin + b]
                 if to[0] >= 0:
                     for plane in range(0, SPIN, TILT):
@@ -108,28 +120,17 @@ def add_modal_damping(q: Floats, v: Floats, modal: ModalArrays | None, memory: F
     """
     if modal is None:
         return 0.0
-    size, count = modal.columns.shape
     moved = memory[MOVED]
     acting = memory[ACTING]
-    amounts = memory[AMOUNTS]
+    size = min(v.size, acting.size)  # a solver's arrays may go on behind the coordinates, where the tiles are zero
+    acting[:] = 0.0
     for i in range(size):
         moved[i] = v[i]
     turn_planets(q, modal, True, v, moved)
-    for k in range(count):
-        amounts[k] = 0.0
-    for i in range(size):
-        rate = moved[i]
-        for k in range(count):
-            amounts[k] += modal.columns[i, k] * rate
+    add_symmetric(modal.tiles, 0, acting.size, moved, acting)
     power = 0.0
     for i in range(size):
-        acting[i] = 0.0
-    for k in range(count):
-        amount = amounts[k]
-        power += amount * amount
-        for i in range(size):
-            acting[i] += modal.rows[k, i] * amount
-    for i in range(size):
+        power += moved[i] * acting[i]
         moved[i] = acting[i]
     turn_planets(q, modal, False, acting, moved)
     for i in range(size):
@@ -155,7 +156,8 @@ def modal_matrix(q: Floats, modal: ModalArrays | None) -> Floats:
 
 
 def modal_memory(modal: ModalArrays | None) -> Floats:
-    """Memory for `add_modal_damping`, (3, m)."""
+    """Memory for `add_modal_damping`, (2, c) with c filled up; what is filled up stays zero."""
     if modal is None:
-        return np.zeros((3, 0))
-    return np.zeros((3, max(modal.columns.shape)))
+        return np.zeros((2, 0))
+    rows = math.isqrt(2 * modal.tiles.size // TILE)  # n (n + 1) / 2 tiles
+    return aligned_zeros(2 * SIZE * rows).reshape(2, -1)

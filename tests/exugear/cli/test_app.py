@@ -23,6 +23,7 @@ from exugear.cli.app import COMMANDS, OBJECTS_OF_A_START, app, garbage_seldom_lo
 from exugear.cli.commands import files, models
 from exugear.cli.console import BadInputError, FailedError, exit_codes, interruption
 from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.templates.kinds import template
 from exugear.system.tooth_mesh.tables import requested_tables
 from fe_ste.elasticity.gear_mesh import ContactMesh
 from fe_ste.reference.position import NonlinearSettings
@@ -51,8 +52,18 @@ def test_check_prints_the_ratio_and_the_pairs():
     assert outcome.exit_code == 0, outcome.stderr
     assert "ratio output/input 81.4907 (i = 0.01227)" in outcome.stdout
     assert "sun_planet" in outcome.stdout
-    (warning,) = outcome.stderr.splitlines()
-    assert warning.startswith("Warning: damping of 8 of 42 modes below 2 kHz is unusual (0.079 % at 62.94 Hz)")
+    assert outcome.stderr == ""
+
+
+def test_check_names_modes_with_unusual_damping(tmp_path):
+    case = tmp_path / "gearbox.toml"
+    text = template("parallel")
+    stated = "modal_percent = 2.0\nmodal_band_percent = [1.0, 4.0]\n"
+    assert stated in text
+    case.write_text(text.replace(stated, "mesh_time_s = 4e-6\nbearing_time_s = 4e-6\n"), encoding="utf-8")
+    (warning,) = exugear("check", case).stderr.splitlines()
+    assert warning.startswith("Warning: damping of ")
+    assert "modal_percent = 2.0" in warning
 
 
 def test_check_as_json_is_one_object_on_standard_output():

@@ -122,7 +122,7 @@ def test_every_key_is_read(read_keys: set[tuple[str, str]], tmp_path: Path) -> N
             assert assembly.constant_forces.shape == (assembly.size,)
             bearing_duties(assembly)
         damping_in_words(gearbox.case.damping)
-        if gearbox.case.damping.modal_band_percent:
+        if name == "waves":  # with modal damping, and without deviations, which steady-state responses refuse
             harmonic_balance_model(assembly, np.array([1.0, 2.0]), 1, 1).at(1.5)
             damping_limits(mean_system(assembly, np.array([1.0, 2.0])))
         for support in (*gearbox.bearings, *gearbox.mounts):

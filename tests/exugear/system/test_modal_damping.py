@@ -16,6 +16,7 @@ from exugear.steady.mean_system.mean_system import mean_modes, mean_system
 from exugear.steady.mean_system.rotating_frame import RotatingFrame, planet_sets
 from exugear.system.build import assemble
 from exugear.system.kernels.modal_damping import ModalArrays, modal_matrix, turn_planets
+from exugear.system.kernels.products import symmetric_tiles
 from exugear.system.loads import LoadTable
 from exugear.system.modes import modes_of
 from exugear.system.signals import POWERS, energy_residual
@@ -87,13 +88,13 @@ def test_turning_planets_is_orthogonal_and_carries_each_into_the_place_of_the_ne
     planets = np.arange(6 * count).reshape(count, 6) + 1
     size = 6 * count + 1
     pitch = 2.0 * np.pi / count
+    place = 0.3 + pitch * np.arange(count)
     arrays = ModalArrays(
-        columns=np.zeros((size, 0)),
-        rows=np.zeros((0, size)),
+        tiles=symmetric_tiles(np.zeros((size, size))),
         frame=np.array([0]),
         first=np.array([0, count]),
         planets=planets,
-        place=0.3 + pitch * np.arange(count),
+        place=np.stack([np.cos(place), np.sin(place)], axis=1),
         equal=np.array([int(count > 2)]),
     )
 

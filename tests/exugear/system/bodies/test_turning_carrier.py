@@ -15,7 +15,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import Permissions
 from exugear.system.loads import LoadTable
-from exugear.system.modes import modes_of
+from exugear.system.modes import modes_of, unusual_damping
 from exugear.system.statics import accelerating_start, locked_equilibrium
 from exugear.system.system import Assembly
 from exugear.transient.compiled.solver import CompiledSystem, Observer
@@ -63,6 +63,17 @@ def carrying(grc_shafts: Gearbox, tmp_path_factory: pytest.TempPathFactory) -> G
 @pytest.fixture(scope="module")
 def flexible(carrying: Gearbox, stiffness: dict) -> Assembly:
     return assembled(carrying, Choice("flexible"), stiffness)
+
+
+def test_a_flexible_carrier_has_damping_times_where_the_file_states_a_share(
+    carrying: Gearbox, flexible: Assembly, stiffness: dict
+) -> None:
+    """Its modes have no constant shapes; the warning about their damping names the carrier."""
+    stated = assembled(carrying.varied({"damping": {"modal_percent": 2.0}}), Choice("flexible"), stiffness)
+    assert stated.modal is None
+    np.testing.assert_array_equal(stated.connectors.damping, flexible.connectors.damping)
+    assert np.any(stated.connectors.damping > 0.0)
+    assert "the flexible body carrier turns with planets" in unusual_damping(modes_of(stated))
 
 
 def turned_state(assembly: Assembly, angle: float, speed: float = 22.5) -> tuple[np.ndarray, np.ndarray]:
