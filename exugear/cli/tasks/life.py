@@ -98,6 +98,9 @@ def print_life(found: Mapping[str, Any], years: float) -> None:
         print_table("Tooth roots: largest stress, safety against breakage", found["flanks"], ROOTS, ROOT_LEGEND)
     if found["bearings"]:
         print_table("Bearings: rating life, static safety", found["bearings"], BEARINGS, BEARING_LEGEND)
+        for bearing, remarks in found["remarks"].items():
+            for remark in remarks:
+                note(f"{bearing}: {remark}", style="yellow")
     worst = [limit for limit in found["limits"] if limit["damage"] != 0.0][:SHOWN_LIMITS]
     if worst:
         title = f"Parts with the largest fatigue damage in {years:g} years"

@@ -65,6 +65,11 @@ def _rated_variant(material: ReportData, data: xr.Dataset) -> dict[str, Any]:
         "words": f"Limiting parts, {name}",
         "gears": Table(_flank_rows(data), caption=f"Gears, {name}", name=f"{label}-gears", sortable=True),
         "bearings": Table(_bearing_rows(data), caption=f"Bearings, {name}", name=f"{label}-bearings", sortable=True),
+        "remarks": [
+            f"{labelled(bearing)}: {remark}"
+            for bearing, remarks in json.loads(data.attrs["bearing_remarks"]).items()
+            for remark in remarks
+        ],
         "rested": listed("assumptions", "unrated"),
     }
 
