@@ -24,6 +24,7 @@ from exugear.life.static_balance import ActingLoads, AngleStore, StaticBalance, 
 from exugear.system.bearings.rolling.life import LEAST_RATIO
 from exugear.system.system import Assembly, input_hash
 from fe_ste.root_stress import MeshCycleStress
+from fe_ste.standards.iso6336 import outside_scope
 from fe_ste.tools.display import ReprMixin
 
 # Summary of a rating: parts that fail, parts below required values, and pairs that need relief
@@ -368,6 +369,9 @@ def _unrated(assembly: Assembly, counted: CountedLoads, stresses: Mapping[str, M
     for pair in dict.fromkeys(mesh.pair.name for mesh in gearbox.meshes):
         if pair not in stresses:
             lines.append(f"pair {pair}: no table, so no stresses")
+    for mesh in gearbox.meshes:
+        if reason := outside_scope(mesh.pair):
+            lines.append(f"{mesh.family}: no nominal stresses and no S_H and S_F to ISO 6336, {reason}")
     for support in dict.fromkeys(one.family for one in assembly.supports if one.catalogue is None):
         lines.append(f"{support}: defined by its stiffness only; add a [.catalogue] table for a rating life")
     if not assembly.supports:

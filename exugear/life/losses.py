@@ -307,7 +307,7 @@ def _mesh_losses(
         other: dict[str, float] = {}
         if table is not None:
             factor = table_loss_factor(pair, table.static_state)
-        elif pair.overlap_ratio >= HELICAL_FROM:
+        elif pair.overlap_ratio >= HELICAL_FROM or pair.transverse_contact_ratio < 1.0:
             factor = helical_loss_factor(pair)
         else:
             factor = loss_factor(pair)

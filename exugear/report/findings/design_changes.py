@@ -322,7 +322,8 @@ def _shift_of_mate(gearbox: Gearbox, pair: GearPair, known: str, other: str, shi
 def _modification_changes(gearbox: Gearbox, name: str, pair: GearPair, deflection: float) -> Iterator[DesignChange]:
     """Tip relief of both gears and lead crowning of gear 1, in units of the deflection of the teeth."""
     both = _gear_names(gearbox, name)
-    length = 0.5 * (pair.transverse_contact_ratio - 1.0) * pair.transverse_base_pitch / MM
+    # Half of the path with two tooth pairs in contact; teeth with a contact ratio near 1 or below get a short one.
+    length = 0.5 * max(pair.transverse_contact_ratio - 1.0, 0.1) * pair.transverse_base_pitch / MM
     for share in AMOUNTS:
         amount = max(1.0, round(share * deflection / UM))
         relief: dict[str, Any] = {}
