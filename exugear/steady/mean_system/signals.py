@@ -242,3 +242,26 @@ def quantities_of(names: Sequence[str]) -> tuple[Quantity, ...]:
             weights = tuple(np.array([weight for _, weight in own]) for own in places.values())
             found.append(Quantity(quantity, units, tuple(places), signals, weights))
     return tuple(found)
+
+
+def named_amplitudes(names: Sequence[str], amplitude: Floats, signal: str) -> Floats | None:
+    """Return the amplitudes of a signal from those of all signals (..., signals); None for an unknown name.
+
+    The name of a bearing without a direction, such as ``support_force left``, stands for the radial amplitude: the root
+    of the sum of squares over both radial directions, of planets the rms value over them.
+
+    Examples
+    --------
+    >>> names = ["overall_dte", *(f"support_force left {axis}" for axis in AXES)]
+    >>> float(named_amplitudes(names, np.array([0.0, 3.0, 4.0, 9.0]), "support_force left"))
+    5.0
+    """
+    if signal in names:
+        return np.asarray(amplitude[..., list(names).index(signal)], dtype=np.float64)
+    radial = [n for n, name in enumerate(names) if not name.endswith(f" {AXES[2]}")]
+    kind, _, place = signal.partition(" ")
+    for quantity in quantities_of([names[n] for n in radial]):
+        if SIGNALS[quantity.name][0] == kind and place in quantity.places:
+            sizes = quantity.sizes(np.asarray(amplitude[..., radial], dtype=np.float64))
+            return np.asarray(sizes[..., quantity.places.index(place)])
+    return None
