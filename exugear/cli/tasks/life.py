@@ -10,6 +10,7 @@ from exugear.cli.console import FailedError, make_results_folder, note, print_js
 from exugear.cli.tables import Column, print_table
 from exugear.cli.watched import WatchedProject
 from exugear.life.life_file import draw_life, summary
+from fe_ste.tools.display import life_text
 
 SHOWN_LIMITS = 8
 _column = partial(Column, missing="")
@@ -78,9 +79,9 @@ BEARINGS = (
     Column("bearing", "bearing"),
     _column("largest\nkN", "largest_load", ".4g", 1e-3),
     _column("equiv.\nkN", "equivalent", ".4g", 1e-3),
-    _column("L10\nh", "basic_hours", ".3g"),
-    _column("L10r\nh", "reference_hours", ".3g"),
-    _column("L10m\nh", "modified_hours", ".3g"),
+    _column("L10\nh", "basic_hours", life_text),
+    _column("L10r\nh", "reference_hours", life_text),
+    _column("L10m\nh", "modified_hours", life_text),
     _column("kappa", "viscosity_ratio", ".2g"),
     _column("stress\nMPa", "pressure", ".0f", 1e-6),
     _column("S_0", "static_safety", ".2f"),

@@ -16,6 +16,7 @@ from exugear.report.pictures.png import png_address
 from exugear.report.sections.material import Part, ReportData
 from exugear.report.web.html import Cell, Table, render
 from exugear.results.folder import StoredStudy, stored_studies
+from fe_ste.tools.display import LONGEST_LIFE, life_text, without_round_off
 
 LEAST_DAMAGE = 1e-6
 """Damages below this value are shown as "below" it."""
@@ -128,7 +129,9 @@ def _cell(data: xr.Dataset, name: str, place: int, key: str, factor: float, form
         return Cell("infinite", value)
     if key.endswith("damage") and value < LEAST_DAMAGE:
         return Cell(f"below {LEAST_DAMAGE:g}", value)
-    return Cell(figure_text(float(format(value, form))) if key.endswith("hours") else format(value, form), value)
+    if key.endswith("hours"):
+        return Cell(figure_text(float(format(value, form))) if value <= LONGEST_LIFE else life_text(value), value)
+    return Cell(format(without_round_off(value), form), value)
 
 
 # Section "Studies": pictures of each study of the gearbox
