@@ -439,10 +439,11 @@ class Project(ReprMixin):
         GearboxFileError
             No section `[rating]`, invalid loads, or strengths that do not fit the gears.
         """
-        from exugear.life.rating.sheet import RATED_AS, balanced, rated, rated_loads
+        from exugear.life.rating.sheet import balanced, rated, rated_as, rated_loads
 
         counted = rated_loads(self.gearbox)
-        at_rest = self.chosen(variant=RATED_AS.variant, mesh_model=RATED_AS.mesh_model)
+        choice = rated_as(self.gearbox)
+        at_rest = self.chosen(variant=choice.variant, mesh_model=choice.mesh_model)
         balance = balanced(at_rest.assembly(), counted, progress)
         if self.gearbox.case.loads is not None:
             found, remarks = self._rated_by_life(counted)

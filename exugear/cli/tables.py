@@ -12,6 +12,7 @@ from rich.cells import cell_len, set_cell_size
 from rich.text import Text
 
 from exugear.cli.console import plain, results
+from fe_ste.tools.display import without_round_off
 
 NARROWEST = 79
 """Minimum width of a table in characters, which fits a terminal of 80."""
@@ -49,7 +50,12 @@ class Column:
             return "inf."
         if self.factor != 1.0:
             value *= self.factor
-        return self.form(value) if callable(self.form) else format(value, self.form)
+        if callable(self.form):
+            return self.form(value)
+        if isinstance(value, float):
+            value = without_round_off(value)
+        text = format(value, self.form)
+        return text.removeprefix("-") if not text.strip("-0.") else text
 
 
 @dataclass(frozen=True)
@@ -108,13 +114,14 @@ def significant(value: float, digits: int = 4, decimals: int = 3) -> str:
     """Format a number with some significant digits, without an exponent and with at most some decimals.
 
     Large numbers keep all digits before the point; above nine of them, or where decimals would show a zero, the number
-    has an exponent.
+    has an exponent. Round-off is zero.
 
     Examples
     --------
     >>> significant(139.192), significant(-0.0), significant(0.53249), significant(2013.46, 5, 1)
     ('139.2', '0.000', '0.532', '2013.5')
     """
+    value = without_round_off(value)
     size = abs(value)
     if not math.isfinite(value):
         return f"{value:g}"

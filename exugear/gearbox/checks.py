@@ -14,7 +14,7 @@ import numpy as np
 
 from exugear.gearbox.body_parts import blank_places
 from exugear.gearbox.parts import Bearing, Body, Coupling, Joint, Mesh, PointForce, connector_matrix
-from exugear.gearbox.reading import GearboxFileError, shortened
+from exugear.gearbox.reading import GearboxFileError, known_names, shortened
 from exugear.gearbox.sections.case import GearboxFile, OverallSection
 from exugear.gearbox.sections.connections import BearingSection, ConnectorDampingSection, StiffnessSection
 from exugear.gearbox.sections.entries import GROUND
@@ -92,7 +92,8 @@ def errors_of_bodies(case: GearboxFile) -> Iterator[str]:
             families[name] = family
         for gear in section.gears_z_mm:
             if gear not in case.gears:
-                yield f"bodies.{family}.gears_z_mm.{gear}: no such gear; gears are {', '.join(case.gears)}"
+                known = known_names("gears", case.gears, f"gears.{gear}")
+                yield f"bodies.{family}.gears_z_mm.{gear}: no such gear; {known}"
         if section.enabled and section.carrier is not None:
             yield from _errors_of_carrier(case, f"bodies.{family}.carrier = {section.carrier!r}", section.carrier)
 
@@ -177,7 +178,8 @@ def errors_of_output_gear(
             )
         return
     if overall.output_gear not in gears:
-        yield f"overall.output_gear = {overall.output_gear!r}: no such gear; gears are {', '.join(gears)}"
+        listed = known_names("gears", gears, f"gears.{overall.output_gear}")
+        yield f"overall.output_gear = {overall.output_gear!r}: no such gear; {listed}"
         return
     turning = _coupled(couplings, overall.output)
     known = [gear for body in bodies if body.name in turning for gear in body.wheels]

@@ -14,7 +14,7 @@ import numpy as np
 
 from exugear.gearbox.named_files import LARGEST_TABLE
 from exugear.gearbox.parts import Body, Mesh, PairSpec, WheelDeviation
-from exugear.gearbox.reading import Origin, part_of_each, parts_of_each
+from exugear.gearbox.reading import Origin, known_names, part_of_each, parts_of_each
 from exugear.gearbox.sections.connections import MeshSection
 from exugear.gearbox.sections.entries import GROUND
 from exugear.gearbox.sections.gears import (
@@ -360,9 +360,8 @@ def gear_pairs(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, GearPair]
     def convert_section(name: str, section: PairSection) -> GearPair:
         for key in ("pinion", "gear"):
             if getattr(section, key) not in gears:
-                raise origin.error(
-                    f"pairs.{name}.{key} = {getattr(section, key)!r}: no such gear; gears are {', '.join(gears)}"
-                )
+                known = known_names("gears", gears, f"gears.{getattr(section, key)}")
+                raise origin.error(f"pairs.{name}.{key} = {getattr(section, key)!r}: no such gear; {known}")
         first = gears[section.pinion]
         second = gears[section.gear]
         # A file may call the larger gear or the ring gear the pinion; gear 1 is then the other gear.
@@ -471,7 +470,8 @@ def meshes(origin: Origin, pairs: Mapping[str, GearPair], bodies: Mapping[str, B
         if not origin.are_enabled(key, section.pinion_body, section.gear_body):
             return ()
         if section.pair not in pairs:
-            raise origin.error(f"{key}.pair = {section.pair!r}: no such pair; pairs are {', '.join(pairs)}")
+            known = known_names("pairs", pairs, f"pairs.{section.pair}")
+            raise origin.error(f"{key}.pair = {section.pair!r}: no such pair; {known}")
         return tuple(_meshes_of_section(origin, name, section, pairs[section.pair], bodies))
 
     return parts_of_each(convert_section, origin.case.meshes)
@@ -560,7 +560,9 @@ def deviations(
         wheels = bodies[section.body].wheels
         gear = section.gear or next(iter(wheels), "")
         if gear not in wheels or (section.gear is None and len(wheels) > 1):
-            raise origin.error(f"{key}.gear = {section.gear!r}: choose one of {', '.join(wheels) or 'no gears'}")
+            if not wheels:
+                raise origin.error(f"{key}.body = {section.body!r}: has no gears; set a body with gears")
+            raise origin.error(f"{key}.gear = {section.gear!r}: choose one of {', '.join(wheels)}")
         return (section.body, gear), _deviation(origin, key, gears[gear], section)
 
     return dict(part_of_each(convert_section, origin.case.deviations).values())

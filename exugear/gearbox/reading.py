@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -273,6 +273,22 @@ def one_of(expected: str, value: Any) -> str:
     return f"must be {expected}"
 
 
+def known_names(kind: str, names: Iterable[str], table: str) -> str:
+    """Return which names a file has, or which table to add if it has none.
+
+    Examples
+    --------
+    >>> known_names("gears", ["sun", "ring"], "gears.NAME")
+    'gears are sun, ring'
+    >>> known_names("pairs", [], "pairs.p")
+    'the file has no pairs; add [pairs.p]'
+    """
+    listed = ", ".join(names)
+    if listed:
+        return f"{kind} are {listed}"
+    return f"the file has no {kind}; add [{table}]"
+
+
 def _path(location: tuple[int | str, ...], content: Any) -> tuple[int | str, ...]:
     """Path of an error in the content, without the names that pydantic adds for the branches of a union type."""
     path: list[int | str] = []
@@ -398,7 +414,8 @@ class Origin(ReprMixin):
         """Return whether all bodies are enabled; an unknown name raises an error, a disabled body does not."""
         for name in names:
             if name != GROUND and name not in self.case.bodies:
-                raise self.error(f"{key}: no body {name!r}; bodies are {', '.join(self.case.bodies)} and ground")
+                known = known_names("bodies", [*self.case.bodies, GROUND], "bodies.NAME")
+                raise self.error(f"{key}: no body {name!r}; {known}")
         return all(name == GROUND or name in self.enabled for name in names)
 
     def suffixes(self, family: str) -> list[str]:

@@ -66,22 +66,24 @@ class SpinConstraint:
     second: str
 
 
-def mesh_row(spins: Sequence[str], mesh: MeshedBodies) -> Floats:
+def mesh_row(spins: Sequence[str], mesh: MeshedBodies, pinion_share: float = 1.0, gear_share: float = 1.0) -> Floats:
     """Return the mesh closure per unit rotation: r_b1 (t1 - tf) +- r_b2 (t2 - tf), flank s = +1.
 
-    Plus for an external pair, minus for an internal one; tf is the rotation of the frame.
+    Plus for an external pair, minus for an internal one; tf is the rotation of the frame. It is also the torque on each
+    body per unit mesh force, of which friction leaves a share on the driven gear.
 
     Parameters
     ----------
     spins : names of the bodies that can rotate; all others are stationary
+    pinion_share, gear_share : shares of the torque on gear 1 and on gear 2
 
     Returns
     -------
     array (spins,), m/rad
     """
     row = np.zeros(len(spins))
-    pinion_radius = mesh.pair.pinion.base_radius
-    gear_radius = mesh.pair.gear.base_radius * (-1.0 if mesh.pair.gear.internal else 1.0)
+    pinion_radius = pinion_share * mesh.pair.pinion.base_radius
+    gear_radius = gear_share * mesh.pair.gear.base_radius * (-1.0 if mesh.pair.gear.internal else 1.0)
     levers = ((mesh.pinion, pinion_radius), (mesh.gear, gear_radius), (mesh.frame, -(pinion_radius + gear_radius)))
     for name, lever in levers:
         if name in spins:

@@ -14,8 +14,8 @@ MODES = 5
 #: Runs in time (`exugear.transient`, both solvers, the models, signals and filters).
 RUN = 11
 #: Life of gears and bearings (`exugear.life`, and the root stress of `fe_ste.root_stress`).
-LIFE = 9
+LIFE = 10
 #: Steady-state responses (`exugear.steady`, and all methods that modes use).
-STEADY = 14
+STEADY = 15
 #: Points of studies (`exugear.studies`: their outputs; the methods that these use have their own versions).
-STUDY = 3
+STUDY = 4

@@ -79,7 +79,8 @@ class BearingLife:
     remarks: tuple[str, ...]
     by_bin: Floats
     reference_by_bin: Floats
-    """(bins,) parts of the damages by torque bin, by L10 and by L10r."""
+    modified_by_bin: Floats
+    """(bins,) parts of the damages by torque bin, by L10, L10r and L10m."""
 
 
 def bearing_lives(
@@ -132,7 +133,8 @@ class _Case:
         basic = np.vectorize(lambda load: basic_rating_life(ratings.dynamic, load, section.type))(equivalents)
         by_bin = np.sum(share / (1e6 * basic), axis=1)
         factor, ratio = self._life_factor(rows, ratings, equivalents, points.speed * turns)
-        modified = float(np.sum(share / (1e6 * basic * factor)))
+        by_modified = np.sum(share / (1e6 * basic * factor), axis=1)
+        modified = float(by_modified.sum())
         damage = float(by_bin.sum())
         lives, pressure, remarks = self._reference(rows, ratings, loads, revolutions, worst)
         by_reference = np.full(len(by_bin), math.nan)
@@ -145,14 +147,7 @@ class _Case:
         )
         largest = float(np.hypot(worst[..., 0], worst[..., 1]).max())
         least = minimum_load(ratings.dynamic, section.type)
-        if ratio < LEAST_RATIO:
-            remarks.append(f"viscosity ratio {ratio:.2g} at the lowest speed: no a_ISO for L10m below {LEAST_RATIO:g}")
-        if largest < least:
-            remarks.append(f"load at most {1e-3 * largest:.3g} kN, below the usual minimum load: elements may slide")
-        if ratings.estimated:
-            remarks.append("ratings estimated from its dimensions (conservative)")
-        elif ratings.makers:
-            remarks.append(f"ratings: smallest in catalogues of {', '.join(ratings.makers)} for {section.designation}")
+        remarks += self._remarks(ratings, ratio, largest, least)
         exponent = 10.0 / 3.0 if section.type.endswith("_roller") else 3.0
         total, hours = float(revolutions.sum()), float(points.hours.sum())
         return BearingLife(
@@ -174,7 +169,25 @@ class _Case:
             remarks=tuple(remarks),
             by_bin=self.acting.sum_by_bin(by_bin),
             reference_by_bin=self.acting.sum_by_bin(by_reference),
+            modified_by_bin=self.acting.sum_by_bin(by_modified),
         )
+
+    def _remarks(self, ratings: Ratings, ratio: float, largest: float, least: float) -> list[str]:
+        """Return remarks on minimum viscosity ratio, largest and minimum load (N), and the source of the ratings."""
+        remarks = []
+        if ratio < LEAST_RATIO:
+            remarks.append(
+                f"viscosity ratio {ratio:.2g} at the lowest speed: ISO 281 has no a_ISO below {LEAST_RATIO:g}; L10m "
+                "contains its minimum there, a_ISO = 0.1"
+            )
+        if largest < least:
+            remarks.append(f"load at most {1e-3 * largest:.3g} kN, below the usual minimum load: elements may slide")
+        if ratings.estimated:
+            remarks.append("ratings estimated from its dimensions (conservative)")
+        elif ratings.makers:
+            designation = self.support.catalogue.designation if self.support.catalogue else ""
+            remarks.append(f"ratings: smallest in catalogues of {', '.join(ratings.makers)} for {designation}")
+        return remarks
 
     def _life_factor(
         self, rows: tuple[RollingRow, ...], ratings: Ratings, loads: Floats, speed: Floats

@@ -27,7 +27,7 @@ from exugear.life.static_balance import ActingLoads, StaticBalance
 from exugear.system.tooth_mesh.tables import TableRequest
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.root_stress import MeshCycleStress, RootGauges, mesh_cycle_stress, root_gauges
-from fe_ste.standards.iso6336 import Hardening
+from fe_ste.standards.iso6336 import Hardening, outside_scope
 from fe_ste.standards.pitting import (
     CASE_HARDENED_BENDING,
     CASE_HARDENED_CONTACT,
@@ -265,7 +265,10 @@ class _Case:
         top = int(np.abs(worst_torque).argmax())
         force = tangential_force(self.pair.pinion, float(torque[top].mean()) / self.pair.pinion.base_radius)
         rated = self._rated(hertz, root, cycles, speed, float(worst[0].max()), float(worst[1].max()))
-        by_standard = self._standard_safeties(points.torque[worn], points.other[worn], speed, cycles)
+        in_scope = not outside_scope(self.pair)
+        by_standard = (math.nan, math.nan)
+        if in_scope:
+            by_standard = self._standard_safeties(points.torque[worn], points.other[worn], speed, cycles)
         by_point = np.zeros((2, len(points.torque)))
         by_point[:, worn] = rated.pop("by_point")
         return FlankLife(
@@ -283,8 +286,8 @@ class _Case:
             root_worn=float(root.max(initial=0.0)),
             reach=highest * float(torque.max()) / float(stress.torque[-1]),
             compression=float(worst[2].min()),
-            nominal_contact=nominal_contact_stress(self.pair, force),
-            nominal_root=self._nominal_root(force),
+            nominal_contact=nominal_contact_stress(self.pair, force) if in_scope else math.nan,
+            nominal_root=self._nominal_root(force) if in_scope else math.nan,
             standard_contact_safety=by_standard[0],
             standard_root_safety=by_standard[1],
             outside=float(stress.at(stress.outside, 0.0, torque, tilt).max()),

@@ -21,8 +21,10 @@ from exugear.life.gear_life import FlankLife, check_strengths, flank_lives, warn
 from exugear.life.load_spectrum.counted import CountedLoads, count_loads
 from exugear.life.load_spectrum.sources import Progress, section_of
 from exugear.life.static_balance import ActingLoads, AngleStore, StaticBalance, acting_loads, static_balance
+from exugear.system.bearings.rolling.life import LEAST_RATIO
 from exugear.system.system import Assembly, input_hash
 from fe_ste.root_stress import MeshCycleStress
+from fe_ste.standards.iso6336 import outside_scope
 from fe_ste.tools.display import ReprMixin
 
 # Summary of a rating: parts that fail, parts below required values, and pairs that need relief
@@ -123,7 +125,10 @@ def shortfalls(
             ("L10m", bearing.modified_hours),
         ):
             if lasting < hours:
-                yield f"{bearing.name}: {name} = {lasting:,.0f} h, required {hours:,.0f} h"
+                floor = ""
+                if name == "L10m" and bearing.viscosity_ratio < LEAST_RATIO:
+                    floor = f" (with a_ISO = 0.1, its minimum, at kappa = {bearing.viscosity_ratio:.2g})"
+                yield f"{bearing.name}: {name} = {lasting:,.0f} h{floor}, required {hours:,.0f} h"
         if bearing.static_safety < rating.minimum_S_0:
             yield f"{bearing.name}: S_0 = {bearing.static_safety:.3g}, required {rating.minimum_S_0:g}"
 
@@ -364,6 +369,9 @@ def _unrated(assembly: Assembly, counted: CountedLoads, stresses: Mapping[str, M
     for pair in dict.fromkeys(mesh.pair.name for mesh in gearbox.meshes):
         if pair not in stresses:
             lines.append(f"pair {pair}: no table, so no stresses")
+    for mesh in gearbox.meshes:
+        if reason := outside_scope(mesh.pair):
+            lines.append(f"{mesh.family}: no nominal stresses and no S_H and S_F to ISO 6336, {reason}")
     for support in dict.fromkeys(one.family for one in assembly.supports if one.catalogue is None):
         lines.append(f"{support}: defined by its stiffness only; add a [.catalogue] table for a rating life")
     if not assembly.supports:

@@ -48,6 +48,7 @@ DAMAGES = {
     "root": ("flank", "root_damage", "root_by_bin"),
     "L10": ("bearing", "damage", "by_bin"),
     "L10r": ("bearing", "reference_damage", "reference_by_bin"),
+    "L10m": ("bearing", "modified_damage", "modified_by_bin"),
 }
 """Dimension, value and value by bin of each kind of damage."""
 LISTS = ("assumptions", "unrated", "failures", "shortfalls", "reliefs")
@@ -278,6 +279,8 @@ def draw_life(data: xr.Dataset, path: str | Path | None = None) -> Figure:
         bars.xaxis.set_major_formatter("{x:g}")
         bars.set_title("what limits")
         bars.invert_yaxis()
+        if not shown:
+            bars.set_title(f"no damage above {LEAST_DAMAGE:g}")
         edges, shares = damage_matrix(data, shown)
         if shares.size:
             drawn = matrix.pcolormesh(1e-3 * edges, np.arange(len(shown) + 1) - 0.5, 100.0 * shares, cmap="viridis")
@@ -305,4 +308,4 @@ def damage_matrix(data: xr.Dataset, parts: list[tuple[str, str, float]]) -> tupl
         rows.append(endless / endless.sum() if endless.any() else values / damage)
     middles = 0.5 * (torque[order][1:] + torque[order][:-1])
     ends = torque[order][[0, -1]]
-    return np.concatenate([ends[:1], middles, ends[1:]]), np.array(rows).reshape(len(parts), -1)
+    return np.concatenate([ends[:1], middles, ends[1:]]), np.array(rows).reshape(len(parts), len(torque))

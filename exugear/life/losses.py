@@ -3,14 +3,15 @@
 Meshes lose P mu_m H_V (`fe_ste.standards.mesh_loss`). Bearings have the frictional moment of SKF by series
 (`exugear.system.bearings.rolling.friction`); needle roller bearings, which it does not describe, have M = mu P d / 2
 with a constant coefficient. Radial shaft seals lose 7.69e-6 d^2 n (W, mm, rpm; ISO/TR 14179-2). Churning, windage and
-auxiliary pumps are not included.
+auxiliary pumps are not included. The power through each mesh is that of the balance of torques with these losses
+(`exugear.life.power_flow`).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.optimize
@@ -20,6 +21,7 @@ from exugear.gearbox.load_cases import summarise_loads
 from exugear.gearbox.parts import Mesh
 from exugear.gearbox.units import MM, RPM, UM
 from exugear.life.gear_life import RZ_OF_RA, roughness_of
+from exugear.life.power_flow import power_flow
 from exugear.system.bearings.duty import BearingLoadState
 from exugear.system.bearings.rolling.friction import friction_series, frictional_moment
 from exugear.system.bearings.rolling.life import viscosity_at
@@ -63,7 +65,7 @@ class MeshLoss:
     family: str
     count: int
     power: float
-    """Through all meshes, relative to their frame, W."""
+    """That enters all meshes, relative to their frame, W."""
     loss_factor: float
     from_table: bool
     """Whether the loss factor is that of the line loads of a transmission error table."""
@@ -125,7 +127,8 @@ class Losses:
     speed: float
     """Of the overall input, rad/s."""
     input_power: float
-    """W."""
+    output_power: float
+    """Power into all driven bodies, and out of all driving ones, W: input is output and losses."""
     oil_temperature: float
     """Degrees Celsius."""
     viscosity: float
@@ -152,11 +155,6 @@ class Losses:
         return seals + sum(low for low, _ in bands), seals + sum(high for _, high in bands)
 
     @property
-    def output_power(self) -> float:
-        """Input power less the losses, W."""
-        return self.input_power - self.total
-
-    @property
     def efficiency(self) -> float:
         """Output power over input power; zero without power."""
         if self.input_power > 0.0:
@@ -179,6 +177,8 @@ def losses_of(
     ------
     GearboxFileError
         Viscosity or temperature of the oil are missing, or the losses heat the oil beyond all limits.
+    SelfLockingError
+        The train locks itself in this direction of power.
     """
     lubricant = gearbox.case.lubricant
     if lubricant is None or lubricant.viscosity_100_mm2_per_s is None:
@@ -224,16 +224,29 @@ def _at_temperature(
     speeds = gearbox.train.rolling_speeds(gearbox.case.overall.input, speed)
     listed = {support.name for support in gearbox.bearings}
     known = {duty.name for duty in duties}
-    stated = [torque * speeds[body] for body, torque in gearbox.case.static_load.torques_N_m.items()]
+    meshes = _mesh_losses(gearbox, tables, speeds, kinematic * density)
+    bearings = _bearing_losses(gearbox, duties, speeds, kinematic)
+    seals = _seal_losses(gearbox, speeds)
+    shares = {mesh.family: mesh.friction * mesh.loss_factor for mesh in meshes}
+    flow = power_flow(
+        gearbox.train,
+        gearbox.case.static_load.torques_N_m,
+        speeds,
+        {mesh.name: shares[mesh.family] for mesh in gearbox.meshes},
+        _drags(gearbox, duties, bearings, seals, speeds),
+    )
     return Losses(
         speed=speed,
-        # The torques of the file, and those that balance them.
-        input_power=sum(max(power, 0.0) for power in (*stated, -sum(stated))),
+        input_power=flow.input,
+        output_power=flow.output,
         oil_temperature=temperature,
         viscosity=kinematic,
-        meshes=_mesh_losses(gearbox, tables, speeds, kinematic * density),
-        bearings=_bearing_losses(gearbox, duties, speeds, kinematic),
-        seals=_seal_losses(gearbox, speeds),
+        meshes=tuple(
+            replace(mesh, power=sum(flow.mesh_power[own.name] for own in gearbox.meshes if own.family == mesh.family))
+            for mesh in meshes
+        ),
+        bearings=bearings,
+        seals=seals,
         without_data=tuple(dict.fromkeys(b.family for b in gearbox.bearings if b.name in listed - known)),
         assumed_roughness=any(
             _roughness(gearbox, gear.name) is None
@@ -241,6 +254,29 @@ def _at_temperature(
             for gear in (mesh.pair.pinion, mesh.pair.gear)
         ),
     )
+
+
+def _drags(
+    gearbox: Gearbox,
+    duties: tuple[BearingLoadState, ...],
+    bearings: tuple[BearingLoss, ...],
+    seals: tuple[SealLoss, ...],
+    speeds: Mapping[str, float],
+) -> dict[str, float]:
+    """Torques of bearings and seals on both of their bodies, N m."""
+    supports = {support.name: support for support in gearbox.bearings}
+    own = {bearing.family: bearing.loss / bearing.count for bearing in bearings}
+    losses = [
+        (supports[duty.name].body, supports[duty.name].on, own[duty.family]) for duty in duties if duty.name in supports
+    ]
+    losses += [(gearbox.case.seals[seal.name].body, gearbox.case.seals[seal.name].on, seal.loss) for seal in seals]
+    drags: dict[str, float] = {}
+    for body, on, loss in losses:
+        relative = speeds.get(body, 0.0) - speeds.get(on, 0.0)
+        if relative != 0.0:
+            drags[body] = drags.get(body, 0.0) - loss / relative
+            drags[on] = drags.get(on, 0.0) + loss / relative
+    return drags
 
 
 def _roughness(gearbox: Gearbox, gear: str) -> float | None:
@@ -254,6 +290,7 @@ def _roughness(gearbox: Gearbox, gear: str) -> float | None:
 def _mesh_losses(
     gearbox: Gearbox, tables: Mapping[str, MeshTable], speeds: Mapping[str, float], viscosity: float
 ) -> tuple[MeshLoss, ...]:
+    """Return the losses of the meshes under tooth forces without friction; dynamic viscosity in Pa s."""
     forces = gearbox.train.static_mesh_forces()
     families: dict[str, list[Mesh]] = {}
     for mesh in gearbox.meshes:
@@ -262,7 +299,7 @@ def _mesh_losses(
     for family, meshes in families.items():
         first = meshes[0]
         pair = first.pair
-        relative = abs(speeds[first.pinion] - speeds.get(first.frame, 0.0))
+        relative = abs(speeds.get(first.pinion, 0.0) - speeds.get(first.frame, 0.0))
         mean = sum(abs(forces[mesh.name]) for mesh in meshes) / len(meshes)
         power = len(meshes) * mean * relative * pair.pinion.base_radius
         table = tables.get(pair.name)
@@ -270,7 +307,7 @@ def _mesh_losses(
         other: dict[str, float] = {}
         if table is not None:
             factor = table_loss_factor(pair, table.static_state)
-        elif pair.overlap_ratio >= HELICAL_FROM:
+        elif pair.overlap_ratio >= HELICAL_FROM or pair.transverse_contact_ratio < 1.0:
             factor = helical_loss_factor(pair)
         else:
             factor = loss_factor(pair)

@@ -322,7 +322,11 @@ class HarmonicResidual:
 
     def _mean_part(self, readings: Complexes) -> Complexes:
         """Return the forces (n, m, f) of the averaged system under readings (n, m, r)."""
-        slopes = self._mean_slopes(readings - self.static)
+        # The averaged system has the mean forces at the static state without friction. What friction deflects is
+        # part of its motion.
+        beyond = readings.copy()
+        beyond[0] -= self.interface.ports.static
+        slopes = self._mean_slopes(beyond)
         slopes[0] += self.mean_force
         return slopes
 

@@ -35,7 +35,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import Permissions
 from exugear.gearbox.reading import GearboxFileError
 from exugear.results.folder import peak_memory
-from exugear.studies.point_results import PointResults, PointSettings, Shared
+from exugear.studies.point_results import PointError, PointResults, PointSettings, Shared
 from exugear.studies.quantities import Output, Values
 from exugear.studies.sampling import changed
 from exugear.system.gearbox_checks import check_parts
@@ -265,7 +265,11 @@ def compute_point(task: Task, work: Work) -> Record:
     try:
         gearbox = _built(task, work)
         results = PointResults(gearbox, task.choice, task.settings, Shared(task.folder / SHARED_FOLDER), folder)
-        values = {name: _journal_form(kept.of(results)) for name, kept in task.outputs.items()}
+        for name, kept in task.outputs.items():
+            try:
+                values[name] = _journal_form(kept.of(results))
+            except PointError as reason:  # the other outputs of the point are valid
+                error += f"{'; ' if error else ''}outputs.{name}: {reason}"
         doubts = list(results.doubts)
         results.clear()
     except StoppedError:

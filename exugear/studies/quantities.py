@@ -18,7 +18,9 @@ import numpy as np
 from exugear.gearbox.renames import STUDY_RENAMES, renamed_hint
 from exugear.gearbox.units import RPM
 from exugear.life.life_file import limits
+from exugear.steady.mean_system.signals import named_amplitudes
 from exugear.steady.peaks import line_name, peaks
+from exugear.steady.steady_file import complex_amplitudes
 from exugear.studies.point_results import PointError, PointResults
 from exugear.system.modes import FREE_ROTATION, Modes
 from exugear.system.signals import SIGNALS
@@ -271,12 +273,22 @@ def _order_amplitudes(results: PointResults, signal: str, orders: list[float], s
 # Outputs of steady-state responses over speed
 
 
+def nearest_names(name: str, known: Sequence[str]) -> str:
+    """Return the most similar of known names as a question, or else the first twelve of them."""
+    near = difflib.get_close_matches(name[:100], known, n=1)
+    if near:
+        return f"did you mean {near[0]!r}?"
+    shown = ", ".join(known[:12]) or "none"
+    return f"there are {shown}" + (f" and {len(known) - 12} more" if len(known) > 12 else "")
+
+
 def _amplitudes(results: PointResults, signal: str) -> Floats:
     """Return the amplitudes (points, lines) of a signal."""
     names = [str(name) for name in results.steady["signal"].to_numpy()]
-    if signal not in names:
-        raise PointError(f"no signal {signal!r}; signals are {', '.join(names)}")
-    return np.asarray(results.steady["amplitude"].to_numpy()[:, :, names.index(signal)], dtype=np.float64)
+    found = named_amplitudes(names, complex_amplitudes(results.steady), signal)
+    if found is None:
+        raise PointError(f"no signal {signal!r}; {nearest_names(signal, names)}")
+    return found
 
 
 def _line(results: PointResults, name: str) -> int:

@@ -13,6 +13,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from exugear.exchange.series_files import file_digest
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
@@ -21,7 +23,10 @@ from exugear.gearbox.reading import GearboxFileError, error_line
 from exugear.gearbox.variant import Variant
 from exugear.gearbox.versions import LIFE, MODES, REDUCTION, RUN, STEADY, STUDY
 from exugear.results.folder import case_digest, read_content
+from exugear.steady.mean_system.mean_system import mean_system
+from exugear.steady.mean_system.mesh_waves import mesh_waves
 from exugear.steady.mean_system.rotating_frame import SteadyError
+from exugear.steady.mean_system.signals import mesh_signal_names, named_amplitudes, signal_rows
 from exugear.steady.settings import SpeedRange, SteadySettings, check_law
 from exugear.studies.point_results import PointSettings, life_loads
 from exugear.studies.quantities import (
@@ -33,6 +38,7 @@ from exugear.studies.quantities import (
     Output,
     OutputError,
     Quantity,
+    nearest_names,
     outputs_of,
 )
 from exugear.studies.sampling import (
@@ -50,8 +56,11 @@ from exugear.studies.sampling import (
 )
 from exugear.studies.sections import StudyError, StudyFile, parse_study, read_study_file
 from exugear.system.bearings.stiffness import elastic_names, mounts_at_work
+from exugear.system.build import assemble
 from exugear.system.signals import signals_of
+from exugear.system.statics import BalanceError
 from exugear.system.tooth_mesh.laws.registry import LAWS
+from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.versions import TABLE
 
@@ -224,10 +233,8 @@ def errors_of_signals(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choi
     jointed = choice.variant.spins_only
     of_runs = [one for one in signals_of(tabled, jointed) if one.stored and one.dimensions[0] == "time"]
     families = [mesh.family for mesh in gearbox.meshes]
-    parts = {"mesh_dte": families, "mesh_force": families}
-    if not jointed:
-        supports = [word for bearing in gearbox.bearings for word in (bearing.name, bearing.family)]
-        parts |= {"support_force": supports, "seat_acceleration": supports}
+    named = [one.options.get("signal", OVERALL) for one in kept.values() if one.quantity.needs == "steady"]
+    steady = _steady_signals(gearbox, choice) if any(signal != OVERALL for signal in named) else []
     for name, output in kept.items():
         signal = str(output.options.get("signal", OVERALL))
         if output.quantity.needs == "run":
@@ -236,11 +243,23 @@ def errors_of_signals(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choi
             if signal not in known:
                 yield f"outputs.{name}.signal = {signal[:200]!r}: no such signal; there are {_listed(known)}"
         elif output.quantity.needs == "steady":
-            quantity, _, rest = signal.partition(" ")
-            if signal != OVERALL and not any(rest.split(" ")[0] == part for part in parts.get(quantity, ())):
-                known = [OVERALL, *(f"{own} {part}" for own, of in parts.items() for part in dict.fromkeys(of))]
-                yield f"outputs.{name}.signal = {signal[:200]!r}: no such signal; there are {_listed(known)}"
+            if signal != OVERALL and named_amplitudes(steady, np.zeros(len(steady), complex), signal) is None:
+                places = dict.fromkeys(" ".join(own.split(" ")[:2]) for own in steady)
+                known = [*places, *(own for own in steady if own not in places)]
+                yield f"outputs.{name}.signal = {signal[:200]!r}: no such signal; {nearest_names(signal, known)}"
             yield from _errors_of_line(name, output, families)
+
+
+def _steady_signals(gearbox: Gearbox, choice: Choice) -> list[str]:
+    """Return the names of all signals of a steady-state response, which do not depend on flexibility and mesh model."""
+    variant = Variant.bushing if choice.variant.is_elastic else choice.variant
+    law = "iso6336"
+    own = Choice(variant, law, choice.inertias)
+    with suppress(BalanceError):
+        system = mean_system(assemble(gearbox, own, mesh_stiffness(gearbox, law)), np.ones(1))
+        rows = signal_rows(system, 1.0).names
+        return [signal.name for signal in (*rows, *mesh_signal_names(mesh_waves(system)))]
+    return []
 
 
 def _errors_of_line(name: str, output: Output, families: Sequence[str]) -> Iterator[str]:

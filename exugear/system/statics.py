@@ -17,6 +17,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 import scipy.linalg
 
+from exugear.system.bearings.rolling.catalogue import catalogue_rows
+from exugear.system.bearings.rolling.contact import LEAST_SHOULDER
+from exugear.system.bearings.stiffness import holds_one_way
 from exugear.system.bodies.turning_frame import TurningBody
 from exugear.system.diagrams import draw_misalignment
 from exugear.system.kernels.connectors import add_connector_tangents
@@ -334,9 +337,37 @@ def locked_equilibrium(
 
     if near is not None:
         with suppress(BalanceError):
-            return np.asarray(origin + free @ solve(assembly, free.T @ (near - origin), meshes))
+            q = np.asarray(origin + free @ solve(assembly, free.T @ (near - origin), meshes))
+            _check_shoulders(assembly, q)
+            return q
     x = _from_linear(assembly, np.zeros(free.shape[1]), lambda x: np.asarray(origin + free @ x), solve, meshes)
-    return np.asarray(origin + free @ x)
+    q = np.asarray(origin + free @ x)
+    _check_shoulders(assembly, q)
+    return q
+
+
+def _check_shoulders(assembly: Assembly, q: Floats) -> None:
+    """Refuse bearings with a contact angle that balls hold on the side of the groove without a shoulder.
+
+    Grooves of balls hold in both directions; those of angular contact bearings end where the contact angle changes its
+    sign. Rollers have no equilibrium there.
+    """
+    loads = assembly.support_loads_at_rest(q)
+    has_rows = np.diff(assembly.connectors.rolling.first) > 0
+    for support, load, own in zip(assembly.supports, loads, has_rows, strict=True):
+        if not own or support.catalogue is None:
+            continue
+        rows = catalogue_rows(support.catalogue)
+        sense = math.copysign(1.0, rows[0].contact_angle)
+        least = LEAST_SHOULDER * float(np.linalg.norm(load[:3]))
+        if holds_one_way(rows) and sense * float(load[2]) < least:
+            what = f"a load of {1e-3 * abs(float(load[2])):.4g} kN towards {'z+-'[int(-sense)]}z"
+            if abs(float(load[2])) < least:
+                what = "a radial load without the axial load that its contact angle requires"
+            raise BalanceError(
+                f"static equilibrium not found: bearings.{support.name} holds its body against loads towards "
+                f"{'z+-'[int(sense)]}z only, and has {what}"
+            )
 
 
 def rolled_coordinates(assembly: Assembly, body: str, angle: float) -> Floats:

@@ -232,7 +232,9 @@ def simulate(
     """
     choice = choice.of(gearbox)
     if choice.load_case not in gearbox.load_cases:
-        raise gearbox.error(f"no load case {choice.load_case!r}; choose one of: {', '.join(gearbox.load_cases)}")
+        raise gearbox.error(
+            f"no load case {choice.load_case!r}; choose one of: {', '.join(gearbox.load_cases) or 'none in the file'}"
+        )
     case = gearbox.load_cases[choice.load_case]
     directory = run_directory(out, choice)
     if resume and duration is None:

@@ -454,10 +454,22 @@ def _check_tip_interference(pair: UncheckedPair) -> None:
 
 
 def _check_contact(pair: UncheckedPair) -> None:
+    """Refuse a pair that loses contact between its tooth pairs.
+
+    Contact lines are a base pitch apart on the field of contact. Helical teeth traverse its length and, by their
+    overlap, its width: one of them is always in contact if both ratios together are at least 1.
+    """
     ratio = pair.transverse_contact_ratio
-    if ratio < 1.0:
-        remedy = f"must be at least 1: no contact at centre_distance = {_mm(pair.centre_distance)}"
-        raise _refuse_pair(pair, "transverse contact ratio", f"{ratio:.4f}", remedy)
+    at = f"at centre_distance = {_mm(pair.centre_distance)}"
+    if ratio <= 0.0:
+        raise _refuse_pair(pair, "transverse contact ratio", f"{ratio:.4f}", f"must be above zero: no contact {at}")
+    if pair.total_contact_ratio < 1.0:
+        key = "transverse contact ratio"
+        value = f"{ratio:.4f}"
+        if pair.overlap_ratio > 0.0:
+            key = "total contact ratio"
+            value = f"{pair.total_contact_ratio:.4f} ({ratio:.4f} + {pair.overlap_ratio:.4f})"
+        raise _refuse_pair(pair, key, value, f"must be at least 1: contact is interrupted {at}")
 
 
 def _check_fillet_clearance(pair: UncheckedPair) -> None:

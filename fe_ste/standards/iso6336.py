@@ -192,6 +192,17 @@ def _outside_validity(pair: GearPair, line_load: float | None) -> tuple[str, ...
     return tuple(remark for remark, applies in remarks.items() if applies)
 
 
+def outside_scope(pair: GearPair) -> str:
+    """Return why ISO 6336 does not apply to a pair (ISO 6336-1, scope); empty if it does.
+
+    Teeth of a transverse contact ratio below 1 are never alone in contact: factors that refer to the points of single
+    contact (Z_B, Z_D, Y_F) and to the share of the load (Z_eps) have no meaning.
+    """
+    if pair.transverse_contact_ratio < 1.0:
+        return f"transverse contact ratio {pair.transverse_contact_ratio:.3f} is below 1, outside the scope of ISO 6336"
+    return ""
+
+
 # Load factors of ISO 6336-1:2006 by method B: K_v, K_Hbeta, K_Halpha and K_Falpha, with what running in takes away
 
 Hardening = Literal["case_hardened", "through_hardened"]

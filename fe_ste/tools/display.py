@@ -104,6 +104,38 @@ def _shown(text: str) -> str:
     return escape(text.encode("utf-8", "replace").decode("utf-8"))
 
 
+ROUND_OFF = 1e-9
+"""Size, in the unit that is displayed, below which numbers are round-off of loads, lengths and shares."""
+LONGEST_LIFE = 1e9
+"""Largest rating life that is displayed as a number: longer ones say that nothing is loaded."""
+
+
+def without_round_off(value: float) -> float:
+    """Return 0 for a number that is displayed and below `ROUND_OFF`, otherwise the number.
+
+    Examples
+    --------
+    >>> without_round_off(7e-13), without_round_off(-0.0), without_round_off(2e-3)
+    (0.0, 0.0, 0.002)
+    """
+    if abs(value) < ROUND_OFF:
+        return 0.0
+    return value
+
+
+def life_text(value: float) -> str:
+    """Return a rating life in three digits, at most `LONGEST_LIFE`.
+
+    Examples
+    --------
+    >>> life_text(6417.3), life_text(1.42e57)
+    ('6.42e+03', '>1e9')
+    """
+    if value > LONGEST_LIFE:
+        return ">1e9"
+    return f"{without_round_off(value):.3g}"
+
+
 def value_range(values: ArrayLike, unit: str, scale: float = 1.0) -> str:
     """Return the range of some values, minimum to maximum, as text, or the single value.
 

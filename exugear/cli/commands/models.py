@@ -416,7 +416,9 @@ def view(
 
 
 def report(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Results folder.", show_default=False)],
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="Results folder, or its gearbox file.", show_default=False)
+    ],
     near: Annotated[
         float | None,
         typer.Option(min=1.0, metavar="HZ", help="Target frequency to compare with modes. (default: gearbox file)"),

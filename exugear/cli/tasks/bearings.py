@@ -10,6 +10,7 @@ from exugear.cli.console import BadInputError, note, print_json, say, warn
 from exugear.cli.tables import Column, print_table, significant
 from exugear.cli.watched import WatchedProject
 from exugear.results.folder import duties_summary
+from fe_ste.tools.display import life_text
 
 LOAD_LEGEND = (
     "Axial load: of the shaft on the inner ring, positive along +z. Misalignment: tilt of the inner ring against the "
@@ -87,8 +88,8 @@ LIVES = (
     Column("max. contact\nstress MPa", "contact_pressure_MPa", ".0f"),
     Column("C_r\nkN", partial(_rating, "dynamic_rating_kN")),
     Column("C_0r\nkN", partial(_rating, "static_rating_kN")),
-    Column("L10\n10⁶ rev", "L10_Mrev", ".3g", missing="inf."),
-    Column("L10r\n10⁶ rev", "L10r_Mrev", ".3g", missing="inf."),
+    Column("L10\n10⁶ rev", "L10_Mrev", life_text, missing="inf."),
+    Column("L10r\n10⁶ rev", "L10r_Mrev", life_text, missing="inf."),
 )
 MESHES = (
     Column("mesh", "mesh"),

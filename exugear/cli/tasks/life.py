@@ -10,6 +10,7 @@ from exugear.cli.console import FailedError, make_results_folder, note, print_js
 from exugear.cli.tables import Column, print_table
 from exugear.cli.watched import WatchedProject
 from exugear.life.life_file import draw_life, summary
+from fe_ste.tools.display import life_text
 
 SHOWN_LIMITS = 8
 _column = partial(Column, missing="")
@@ -78,9 +79,9 @@ BEARINGS = (
     Column("bearing", "bearing"),
     _column("largest\nkN", "largest_load", ".4g", 1e-3),
     _column("equiv.\nkN", "equivalent", ".4g", 1e-3),
-    _column("L10\nh", "basic_hours", ".3g"),
-    _column("L10r\nh", "reference_hours", ".3g"),
-    _column("L10m\nh", "modified_hours", ".3g"),
+    _column("L10\nh", "basic_hours", life_text),
+    _column("L10r\nh", "reference_hours", life_text),
+    _column("L10m\nh", "modified_hours", life_text),
     _column("kappa", "viscosity_ratio", ".2g"),
     _column("stress\nMPa", "pressure", ".0f", 1e-6),
     _column("S_0", "static_safety", ".2f"),
@@ -98,6 +99,9 @@ def print_life(found: Mapping[str, Any], years: float) -> None:
         print_table("Tooth roots: largest stress, safety against breakage", found["flanks"], ROOTS, ROOT_LEGEND)
     if found["bearings"]:
         print_table("Bearings: rating life, static safety", found["bearings"], BEARINGS, BEARING_LEGEND)
+        for bearing, remarks in found["remarks"].items():
+            for remark in remarks:
+                note(f"{bearing}: {remark}", style="yellow")
     worst = [limit for limit in found["limits"] if limit["damage"] != 0.0][:SHOWN_LIMITS]
     if worst:
         title = f"Parts with the largest fatigue damage in {years:g} years"

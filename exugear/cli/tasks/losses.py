@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
 from exugear.cli.case import assembled_by_iso
-from exugear.cli.console import BadInputError, note, print_json, say, warn
+from exugear.cli.console import BadInputError, FailedError, note, print_json, say, warn
 from exugear.cli.tables import Column, print_table, print_text, significant
 from exugear.cli.watched import WatchedProject
 from exugear.gearbox.gearbox import Gearbox
@@ -15,6 +16,7 @@ from exugear.gearbox.load_cases import static_load_in_words
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.life.losses import Losses, losses_of, operating_speed
+from exugear.life.power_flow import SelfLockingError
 from exugear.project import Project
 from exugear.system.gearbox_checks import lacking
 from exugear.system.operating_points import bearing_duties
@@ -41,7 +43,10 @@ def losses(project: WatchedProject, speed: float | None, efficiency_map: bool, a
         raise BadInputError(f"--speed {speed:g}: must be a number of rpm up to {FASTEST:g}, not 0")
     chosen = operating_speed(gearbox, speed)
     tables = project.tables_at_work()
-    found = losses_of(gearbox, _duties(gearbox), tables, chosen)
+    try:
+        found = losses_of(gearbox, _duties(gearbox), tables, chosen)
+    except SelfLockingError as error:
+        raise FailedError(f"{static_load_in_words(gearbox)} at {significant(chosen / RPM)} rpm: {error}") from None
     summary = {"case": gearbox.source, **summarise(found), "map": []}
     if efficiency_map:
         summary["map"] = _mapped(project, tables, chosen)
@@ -59,7 +64,7 @@ def _duties(gearbox: Gearbox) -> Any:
 
 
 def _mapped(project: Project, tables: dict[str, MeshTable], speed: float) -> list[dict[str, float]]:
-    """Efficiency and losses over shares of the speed and of the torques."""
+    """Efficiency and losses over shares of speed and torque; only the shares where the train locks itself."""
     torques = project.gearbox.case.static_load.torques_N_m
     rows = []
     for torque in SHARES:
@@ -67,17 +72,16 @@ def _mapped(project: Project, tables: dict[str, MeshTable], speed: float) -> lis
         gearbox = project.gearbox.varied({"static_load.torques_N_m": scaled})
         duties = _duties(gearbox)
         for share in SHARES:
-            own = losses_of(gearbox, duties, tables, share * speed)
-            rows.append(
-                {
-                    "torque_share": torque,
-                    "speed_share": share,
+            row = {"torque_share": torque, "speed_share": share}
+            with suppress(SelfLockingError):
+                own = losses_of(gearbox, duties, tables, share * speed)
+                row |= {
                     "input_power_W": own.input_power,
                     "losses_W": own.total,
                     "efficiency": own.efficiency,
                     "oil_temperature_C": own.oil_temperature,
                 }
-            )
+            rows.append(row)
     return rows
 
 
@@ -186,6 +190,8 @@ def _print(load: str, summary: Mapping[str, Any]) -> None:
         "Not included: churning, windage, pumps, and seals without a table [seals.NAME]. They matter most at low "
         "torque and high speed, where the efficiency is overestimated."
     )
+    if summary["output_power_W"] == 0.0:
+        warn("the losses exceed the power of the static load: every loaded body has to be driven")
     if summary["assumed_roughness"]:
         note("Roughness Ra 0.5 µm is assumed for gears without roughness_Ra_um or roughness_Rz_um in [rating.gears]")
     if summary["bearings_without_data"]:
@@ -197,7 +203,9 @@ def _print(load: str, summary: Mapping[str, Any]) -> None:
             "set catalogue.designation or catalogue.series"
         )
     if summary["map"]:
-        efficiency = {(point["speed_share"], point["torque_share"]): point["efficiency"] for point in summary["map"]}
+        efficiency = {
+            (point["speed_share"], point["torque_share"]): point.get("efficiency") for point in summary["map"]
+        }
         rows = [{"torque": torque, **{str(speed): efficiency[speed, torque] for speed in SHARES}} for torque in SHARES]
         columns = [Column(f"{100 * speed:g} %\nspeed", str(speed), ".2f", 100.0) for speed in SHARES]
         print_table("Efficiency, %", rows, [Column("torque", lambda row: f"{100 * row['torque']:g} %"), *columns])

@@ -65,14 +65,14 @@ def report(
 ) -> None:
     """Write the report of a results folder and print its statements."""
     check_allow_dir(allow_dir)
+    folder = _results_of(folder)
     if not folder.is_dir():
         raise BadInputError(f"{folder}: no such folder; specify the results folder of `exugear run`")
-    if compare is not None and not compare.is_dir():
-        raise BadInputError(f"{compare}: --compare: no such folder; specify the results folder of another design")
     if not changes.levers and (changes.resonance is not None or changes.loads):
         raise BadInputError("--resonance and --load are for design changes: add --levers")
-    folder = _results_of(folder)
     other = None if compare is None else _results_of(compare)
+    if other is not None and not other.is_dir():
+        raise BadInputError(f"{other}: --compare: no such folder; specify the results folder of another design")
     if other is not None:
         _check_comparison(folder, other, allow_dir)
     if not stored:
@@ -165,7 +165,9 @@ def _design_changes(folder: Path, allow_dir: Path | None, changes: DesignOptions
 
 
 def _results_of(folder: Path) -> Path:
-    """Return the default results folder of the gearbox file in a folder, if only that one contains results."""
+    """Return the default results folder of a gearbox file, or of that in a folder if only this one contains results."""
+    if folder.suffix == ".toml" and folder.is_file():
+        return default_folder(folder)
     below = default_folder(folder / "gearbox.toml")
     if (folder / CASE_FILE).is_file() or not (below / CASE_FILE).is_file() or not any(folder.glob("*.toml")):
         return folder

@@ -162,7 +162,7 @@ def summarise(study: Study, swept: StudyResult, pictures: list[Path]) -> dict[st
         "failed": len(failed),
         "missing": total - len(swept.records),
         "seconds_of_points": round(sum(record.seconds for record in swept.records.values()), 3),
-        "errors": [record.error for record in failed[:SHOWN_FAILURES]],
+        "errors": list(dict.fromkeys(record.error for record in failed))[:SHOWN_FAILURES],
         "file": None if swept.path is None else str(swept.path),
         "pictures": [str(picture) for picture in pictures],
     }

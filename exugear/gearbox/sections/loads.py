@@ -20,6 +20,11 @@ FilePattern = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]+$", max_length=10
 """File names below the folder of the gearbox file, with the wildcards `*` and `?`."""
 
 
+_Torques = Annotated[tuple[q.TorqueNm, ...], Field(strict=False, min_length=1, max_length=1000)]
+_Speeds = Annotated[tuple[q.SpeedRpm, ...], Field(strict=False, min_length=1, max_length=1000)]
+_Hours = Annotated[tuple[q.NominalHours, ...], Field(strict=False, min_length=1, max_length=1000)]
+
+
 class WindSection(Section):
     """Weibull distribution of the wind speed, for load files of one wind speed each."""
 
@@ -36,13 +41,19 @@ class WindSection(Section):
 
 
 class SourceSection(Section):
-    """One load file, or many of one kind, and their duration or number of occurrences per year."""
+    """One load file, many of one kind, or operating points, and their duration or number of occurrences per year."""
 
     file: FileName | None = None
     """OpenFAST output (`.outb`, `.out`), a table (`.csv`) or load cases (`.rexs`), in the folder of the gearbox file.
     """
     files: FilePattern | None = None
     """Many time series instead, such as `dlc/*.outb`: all matching files, with identical channels."""
+    torque_N_m: _Torques | None = None
+    """Operating points instead of a file: torques on the body, with `speed_rpm` and `hours` of the same length."""
+    speed_rpm: _Speeds | None = None
+    """Speed of the body at each operating point."""
+    hours: _Hours | None = None
+    """Hours of each operating point in the whole life; with `hours_per_year` they are relative."""
     kind: Literal["fatigue", "extreme"] = "fatigue"
     """Whether the source contributes to fatigue damage, or only its extreme values are used."""
     case: Text = ""
@@ -82,11 +93,16 @@ class SourceSection(Section):
     def _how_often(self) -> SourceSection:
         ways = ("hours_per_year", "events_per_year", "hours_table", "wind")
         given = sum(getattr(self, way) is not None for way in ways)
-        if (self.file is None) == (self.files is None):
-            raise ValueError("a source requires file or files; set one of them")
+        points = (self.torque_N_m, self.speed_rpm, self.hours)
+        stated = [own for own in points if own is not None]
+        if (self.file is not None) + (self.files is not None) + bool(stated) != 1:
+            raise ValueError("a source requires file, files, or torque_N_m with speed_rpm and hours; set one of them")
+        if stated and len({len(own) for own in stated}) + len(points) - len(stated) != 1:
+            raise ValueError("torque_N_m, speed_rpm and hours must be stated together, with as many values")
         if self.hours_table is not None and self.files is None:
             raise ValueError("hours_table applies to files; set hours_per_year for a single file")
-        counted = self.file is not None and self.file.lower().endswith(".csv") and not given
+        table = bool(stated) or (self.file is not None and self.file.lower().endswith(".csv"))
+        counted = table and not given
         if self.kind == "fatigue" and given != 1 and not counted:
             raise ValueError(f"a fatigue source requires one of {', '.join(ways)}")
         if self.kind == "fatigue" and self.partial_factor is not None:

@@ -224,6 +224,7 @@ def load_sources(gearbox: Gearbox, progress: Progress | None = None) -> tuple[Lo
     drafts = []
     for name, source in loads.sources.items():
         draft = _Draft(gearbox, loads, name, source)
+        draft.take_stated()
         for path in paths[name]:
             if progress is not None:
                 progress(done, total)
@@ -250,7 +251,7 @@ def section_of(gearbox: Gearbox) -> LoadsSection:
         There is none.
     """
     if gearbox.case.loads is None:
-        raise gearbox.error("loads: this section is missing; add [loads] with the loaded body and the load files")
+        raise gearbox.error("loads: this section is missing; add [loads] with the loaded body and its loads")
     return gearbox.case.loads
 
 
@@ -280,6 +281,8 @@ def points_of(gearbox: Gearbox, sources: tuple[LoadSource, ...], found: Duration
 
 def _paths(gearbox: Gearbox, key: str, source: SourceSection) -> list[Path]:
     """Return the files of a source, all inside the folder of the gearbox file."""
+    if source.hours is not None:
+        return []
     if source.file is not None:
         path = gearbox.file(f"{key}.file", source.file, LARGEST_SERIES)
         if path.suffix.lower() not in (*SERIES_ENDINGS, *REXS_ENDINGS):
@@ -319,6 +322,20 @@ class _Draft:
         self._remarks: tuple[str, ...] = ()
         self._skipped = 0.0
         self._hours = self._stated_hours()
+
+    def take_stated(self) -> None:
+        """Take the operating points that the gearbox file states, if any."""
+        section = self.section
+        if section.torque_N_m is None or section.speed_rpm is None or section.hours is None:
+            return
+        points = np.array([section.torque_N_m, section.speed_rpm, section.hours])
+        path = Path(self.gearbox.source)
+        self._digests.append((path.name, hashlib.sha256(points.tobytes()).hexdigest()))
+        try:
+            self._table = self._scaled(path, points[0], points[1] * RPM, points[2])
+        except LoadFileError as error:
+            raise self.gearbox.error(f"{self.key}: {error}") from error
+        self._check_table(path)
 
     def take(self, path: Path) -> None:
         """Read a file."""

@@ -31,9 +31,10 @@ from exugear.life.load_spectrum.counting import LoadPoints, load_duration
 from exugear.life.load_spectrum.sources import HOURS_PER_YEAR, LoadSource
 from exugear.life.rating.standard import FlankRules, MeshLoads, rate
 from exugear.life.static_balance import ActingLoads, StaticBalance, acting_loads, static_balance
+from exugear.system.gearbox_checks import lacking, usual_variant
 from exugear.system.system import Assembly
 from fe_ste.root_stress import MeshCycleStress
-from fe_ste.standards.iso6336 import Edition
+from fe_ste.standards.iso6336 import Edition, outside_scope
 from fe_ste.standards.pitting import UNMODIFIED, tangential_force
 from fe_ste.standards.tooth_root import root_stress_factors
 from fe_ste.tools.display import ReprMixin
@@ -171,7 +172,10 @@ def rating_sheet(
     finite_elements : (gear, family, flank) finite element results
     """
     flanks = []
+    scope = {mesh.family: reason for mesh in gearbox.meshes if (reason := outside_scope(mesh.pair))}
     for tooth in distinct(counted.teeth):
+        if tooth.family in scope:
+            continue
         for sense in (1, -1):
             key = tooth.gear, tooth.family, FLANKS[sense * tooth.flank]
             if np.any(acting.points.torque * sense > 0.0):
@@ -183,6 +187,7 @@ def rating_sheet(
         flanks=tuple(flanks),
         shortfalls=tuple(_shortfalls(rating, flanks)),
         assumptions=(*assumptions, *_assumptions(gearbox, rating)),
+        left_out=(*(f"{family}: not rated, {reason}" for family, reason in scope.items()), *NOT_RATED),
         other_edition=OTHER_EDITION[rating.edition],
     )
 
@@ -307,7 +312,11 @@ def _shortfalls(rating: RatingSection, flanks: list[FlankSheet]) -> Iterator[str
 
 
 def _assumptions(gearbox: Gearbox, rating: RatingSection) -> Iterator[str]:
-    yield "K_gamma and misalignment: static balance with elastic bearings and the mesh stiffness of ISO 6336-1"
+    if usual_variant(gearbox).has_bearings:
+        yield "K_gamma and misalignment: static balance with elastic bearings and the mesh stiffness of ISO 6336-1"
+    else:
+        reason = lacking(gearbox, Variant.bushing)
+        yield f"K_gamma = 1 and no misalignment by the load, because gears are on ideal joints: {reason}"
     yield (
         "C_R = 1: gears are solid discs; helix and profile modifications are not included in K_v, K_Hbeta and K_Halpha"
     )
@@ -471,10 +480,15 @@ def _source(torque: float, speed: float, hours: float) -> LoadSource:
     )
 
 
-# From a gearbox file to its rating sheet: its load spectrum or the nominal load, balanced on bearings
+# From a gearbox file to its rating sheet: its load spectrum or the nominal load, in static balance
 
-RATED_AS = Choice(Variant.bushing, "iso6336")
-"""Model settings for forces and misalignment to the standard: shafts on bearings, mesh stiffness to ISO 6336-1."""
+
+def rated_as(gearbox: Gearbox) -> Choice:
+    """Return the model settings for forces and misalignment: mesh stiffness to ISO 6336-1, shafts on bearings.
+
+    Gears without bearings are rated on ideal joints: planets share the load equally and gears are aligned.
+    """
+    return Choice(usual_variant(gearbox), "iso6336")
 
 
 def rated_loads(gearbox: Gearbox) -> CountedLoads:
@@ -496,7 +510,7 @@ def rated_loads(gearbox: Gearbox) -> CountedLoads:
 def balanced(
     assembly: Assembly, counted: CountedLoads, progress: Callable[[int, int], None] | None = None
 ) -> StaticBalance:
-    """Solve the static balance of a gearbox for its rating (`RATED_AS`), over the torques of its loads.
+    """Solve the static balance of a gearbox for its rating (`rated_as`), over the torques of its loads.
 
     Raises
     ------

@@ -188,7 +188,8 @@ def _modification_changes(gearbox: Gearbox, name: str, pair: GearPair, deflectio
     """More and less tip relief and lead crowning, in units of the deflection of the teeth."""
     both = _gear_names(gearbox, name)
     sections = {gear: gearbox.case.gears[gear].modification or ModificationSection() for gear in both}
-    length = 0.5 * (pair.transverse_contact_ratio - 1.0) * pair.transverse_base_pitch / MM
+    # Half of the path with two tooth pairs in contact; teeth with a contact ratio near 1 or below get a short one.
+    length = 0.5 * max(pair.transverse_contact_ratio - 1.0, 0.1) * pair.transverse_base_pitch / MM
     amounts = sorted({max(1.0, round(share * deflection / UM)) for share in AMOUNTS})
     for amount in amounts:
         relief: dict[str, Any] = {}

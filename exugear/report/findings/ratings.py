@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.variant import VariantError
 from exugear.life.life_file import stored_lives
-from exugear.life.rating.sheet import RATED_AS, RatingSheet, balanced, life_results, rated, rated_loads
+from exugear.life.rating.sheet import RatingSheet, balanced, life_results, rated, rated_as, rated_loads
 from exugear.report.findings.context import Context
 from exugear.system.bearings.rolling.rows import BearingError
 from exugear.system.statics import BalanceError
@@ -58,7 +58,7 @@ def ratings_of(context: Context) -> Ratings:
         return Ratings(tuple(lives))
     try:
         counted = rated_loads(gearbox)
-        balance = balanced(context.assembled(RATED_AS.of(gearbox)), counted)
+        balance = balanced(context.assembled(rated_as(gearbox).of(gearbox)), counted)
     except (GearboxFileError, BalanceError, VariantError, MeshError, BearingError) as error:
         context.notes.left_out.append(f"rating to ISO 6336: {error}")
         return Ratings(tuple(lives))

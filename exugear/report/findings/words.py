@@ -13,6 +13,7 @@ import xarray as xr
 from exugear.gearbox.gearbox import Gearbox
 from exugear.results.spectra.run_spectra import element_words
 from exugear.results.spectra.waterfall import OrderLine
+from fe_ste.tools.display import without_round_off
 
 MOTIONS = {
     "spin": ("rotates", "rotate"),
@@ -260,6 +261,7 @@ def figure_text(value: float, digits: int = 3) -> str:
     >>> figure_text(205.87, 4), figure_text(62.3, 2), figure_text(1234.0), figure_text(-0.0004)
     ('205.9', '62', '1234', '-0.0004')
     """
+    value = without_round_off(value)
     if value and abs(value) >= 10.0 ** (digits - 1):
         if abs(value) < 1e7:
             return f"{value:.0f}"

@@ -23,6 +23,7 @@ from exugear.system.operating_points import bearing_duties, mesh_duties
 from exugear.system.statics import BalanceError
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.contact_state import MeshLoadState
+from fe_ste.tools.display import life_text, without_round_off
 
 CONTACT_LOSS_RATIO = 1.0
 """Dynamic over mean force above which a linear bearing model would lose contact; the page warns then."""
@@ -219,7 +220,7 @@ def _duty_row(material: ReportData, duty: BearingLoadState) -> dict[str, object]
     return {
         "bearing": material.words.of(duty.name),
         "model": duty.model,
-        "radial load / kN": f"{1e-3 * duty.radial_load:.4g}",
+        "radial load / kN": f"{without_round_off(1e-3 * duty.radial_load):.4g}",
         "axial load / kN": f"{round(1e-3 * duty.axial_load, 3) + 0.0:.4g}",
         "radial stiffness / (GN/m)": f"{1e-9 * duty.radial_stiffness:.3g}",
         "axial stiffness / (GN/m)": f"{1e-9 * duty.stiffness[2, 2]:.3g}",
@@ -233,4 +234,4 @@ def _duty_row(material: ReportData, duty: BearingLoadState) -> dict[str, object]
 
 
 def _life(value: float) -> Cell:
-    return Cell(f"{value:.3g}" if math.isfinite(value) else "no load", value)
+    return Cell(life_text(value) if math.isfinite(value) else "no load", value)

@@ -16,6 +16,7 @@ from exugear.report.pictures.png import png_address
 from exugear.report.sections.material import Part, ReportData
 from exugear.report.web.html import Cell, Table, render
 from exugear.results.folder import StoredStudy, stored_studies
+from fe_ste.tools.display import LONGEST_LIFE, life_text, without_round_off
 
 LEAST_DAMAGE = 1e-6
 """Damages below this value are shown as "below" it."""
@@ -65,6 +66,11 @@ def _rated_variant(material: ReportData, data: xr.Dataset) -> dict[str, Any]:
         "words": f"Limiting parts, {name}",
         "gears": Table(_flank_rows(data), caption=f"Gears, {name}", name=f"{label}-gears", sortable=True),
         "bearings": Table(_bearing_rows(data), caption=f"Bearings, {name}", name=f"{label}-bearings", sortable=True),
+        "remarks": [
+            f"{labelled(bearing)}: {remark}"
+            for bearing, remarks in json.loads(data.attrs["bearing_remarks"]).items()
+            for remark in remarks
+        ],
         "rested": listed("assumptions", "unrated"),
     }
 
@@ -123,7 +129,9 @@ def _cell(data: xr.Dataset, name: str, place: int, key: str, factor: float, form
         return Cell("infinite", value)
     if key.endswith("damage") and value < LEAST_DAMAGE:
         return Cell(f"below {LEAST_DAMAGE:g}", value)
-    return Cell(figure_text(float(format(value, form))) if key.endswith("hours") else format(value, form), value)
+    if key.endswith("hours"):
+        return Cell(figure_text(float(format(value, form))) if value <= LONGEST_LIFE else life_text(value), value)
+    return Cell(format(without_round_off(value), form), value)
 
 
 # Section "Studies": pictures of each study of the gearbox

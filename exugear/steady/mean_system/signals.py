@@ -271,3 +271,26 @@ def quantities_of(names: Sequence[str], mounts: Collection[str]) -> tuple[Quanti
             )
             found.append(Quantity(quantity, units, tuple(places), signals, weights))
     return tuple(found)
+
+
+def named_amplitudes(names: Sequence[str], amplitude: Complexes | SingleComplexes, signal: str) -> Floats | None:
+    """Return the amplitudes of a signal from those of all signals (..., signals); None for an unknown name.
+
+    The name of a bearing without a direction, such as ``support_force left``, stands for the radial amplitude: the
+    largest magnitude of the radial vector, of planets the rms value over them.
+
+    Examples
+    --------
+    >>> names = ["overall_dte", *(f"support_force left {axis}" for axis in AXES)]
+    >>> float(named_amplitudes(names, np.array([0.0, 3.0, 4.0, 9.0]), "support_force left"))
+    5.0
+    """
+    if signal in names:
+        return np.abs(amplitude[..., list(names).index(signal)].astype(np.complex128))
+    radial = [n for n, name in enumerate(names) if not name.endswith(f" {AXES[2]}")]
+    kind, _, place = signal.partition(" ")
+    for quantity in quantities_of([names[n] for n in radial], ()):
+        if SIGNALS[quantity.name][0] == kind and place in quantity.places:
+            sizes = quantity.sizes(amplitude[..., radial])
+            return np.asarray(sizes[..., quantity.places.index(place)])
+    return None

@@ -259,9 +259,11 @@ def test_life(printed: Printed) -> None:
         "bearings": [{**bearing, "bearing": name} for name in NAMES],
         "limits": [{"part": name, "by": "L10r", "damage": 2.0} for name in NAMES],
         **dict.fromkeys(("failures", "assumptions", "unrated", "reliefs"), ()),
+        "remarks": {LONG: ["load below the usual minimum load"]},
     }
     life.print_life(summary, 20.0)
     assert "inf." in "\n".join(printed.lines)
+    assert ">1e9" in "\n".join(printed.lines)
     printed.check(4)
 
 
@@ -337,3 +339,14 @@ def test_a_column_converts_units_and_names_unknown_and_infinite_values(printed: 
     assert printed.rows == [
         [{"part": "a", "load\nkN": "12.35", "life\nh": "inf."}, {"part": "b", "load\nkN": "-", "life\nh": "none"}]
     ]
+
+
+@pytest.mark.parametrize("form", [".4g", "g", ".0f", tables.significant])
+def test_round_off_is_printed_as_zero(form: Any) -> None:
+    """A load of 4e-12 kN, a transmission error of -7e-13 um: no digit of them has a meaning."""
+    for value in (4e-12, -7e-13, -0.0):
+        assert float(tables.Column("load", "load", form).cell({"load": value})) == 0.0
+        assert not tables.Column("load", "load", form).cell({"load": value}).startswith("-")
+    assert tables.Column("load\nkN", "load", ".4g", 1e-3).cell({"load": 4e-9}) == "0"
+    assert tables.Column("gap", "gap", ".0f").cell({"gap": -0.2}) == "0"
+    assert tables.Column("gap", "gap", ".2g").cell({"gap": 2.5e-8}) == "2.5e-08"

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from exugear.cli.tasks.life import print_life
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
@@ -24,7 +25,7 @@ from exugear.gearbox.variant import VariantError
 from exugear.life.dynamic_factors import stated_factors
 from exugear.life.gear_life import flank_lives, pair_stresses, warn_beyond_tables
 from exugear.life.life import checked_loads, compute_life, needs_of_relief, rating_of, shortfalls
-from exugear.life.life_file import damage_matrix, limits, read_life
+from exugear.life.life_file import damage_matrix, draw_life, limits, read_life, summary
 from exugear.life.load_spectrum.counted import count_loads
 from exugear.life.rating.lacks import missing_for_life
 from exugear.life.static_balance import StaticBalance, acting_loads, static_balance
@@ -361,6 +362,39 @@ def test_gears_with_tip_relief_are_told_to_have_too_little_not_none(tmp_path, st
     )
     (said,) = needs_of_relief(relieved, flanks)
     assert said.endswith("present: 12 µm of tip relief on pinion; increase its amount or length")
+
+
+def test_a_lightly_loaded_gearbox_has_a_picture_and_safeties_by_torque(first, tmp_path):
+    """Without damage there is nothing to draw; by Hertz S_H falls with the root of the torque, S_F with the torque."""
+    safeties = []
+    for torque in (2.0, 0.5):
+        project = spur_project(first.folder, f"torque_N_m,speed_rpm,hours\n{torque},1500,1\n")
+        data = project.life()
+        assert max(damage for _, _, damage in limits(data)) < 1e-6
+        _, shares = damage_matrix(data, [])
+        assert shares.shape == (0, 1)
+        draw_life(data, tmp_path / "life.png")
+        safeties.append([float(data[f"flank_standard_{kind}_safety"][0]) for kind in ("contact", "root")])
+    assert safeties[1][0] / safeties[0][0] == pytest.approx(2.0, rel=1e-9)
+    assert safeties[1][1] / safeties[0][1] == pytest.approx(4.0, rel=1e-9)
+
+
+def test_the_life_printed_has_the_remarks_on_bearings(first, capsys):
+    """Below kappa = 0.1 ISO 281 has no a_ISO: L10m is a tenth of L10 then, and counts among what limits."""
+    project = spur_project(first.folder, "torque_N_m,speed_rpm,hours\n100,2,1\n")
+    content = project.gearbox.content
+    rating = {key: value for key, value in content["rating"].items() if key != "viscosity_40_mm2_per_s"}
+    oil = {**OIL, "temperature_C": 100.0, "cleanliness": "typical"}
+    gearbox = project.gearbox.varied({"rating": rating, "lubricant": oil})
+    found = summary(replace(project, gearbox=gearbox).life())
+    (bearing,) = found["bearings"]
+    assert bearing["viscosity_ratio"] < 0.1
+    assert bearing["modified_hours"] == pytest.approx(0.1 * bearing["basic_hours"], rel=1e-3)
+    assert ("bearing_1", "L10m") in {(limit["part"], limit["by"]) for limit in found["limits"]}
+    print_life(found, 10.0)
+    printed = " ".join("".join(capsys.readouterr()).split())
+    assert "bearing_1: viscosity ratio" in printed
+    assert "L10m contains its minimum there, a_ISO = 0.1" in printed
 
 
 def test_bad_input_writes_nothing(tmp_path):

@@ -236,15 +236,19 @@ def test_bearing_lives_below_the_hours_asked_for_are_shortfalls_and_limit(tmp_pa
     assert weak == ["bearing_1: S_0 = 0.9, required 1"]
 
 
-def test_l10_is_among_what_limits():
+def test_each_bearing_life_is_among_what_limits():
     import xarray as xr
 
     data = xr.Dataset(
-        {"bearing_damage": ("bearing", [2.6]), "bearing_reference_damage": ("bearing", [0.8])}
+        {
+            "bearing_damage": ("bearing", [2.6]),
+            "bearing_reference_damage": ("bearing", [0.8]),
+            "bearing_modified_damage": ("bearing", [3.1]),
+        }
         | {f"flank_{key}": ("flank", np.zeros(0)) for key in ("contact_damage", "root_damage")},
         {"bearing": ["hss_a"], "flank": np.zeros(0)},
     )
-    assert limits(data) == [("hss_a", "L10", 2.6), ("hss_a", "L10r", 0.8)]
+    assert limits(data) == [("hss_a", "L10m", 3.1), ("hss_a", "L10", 2.6), ("hss_a", "L10r", 0.8)]
 
 
 @pytest.mark.validation

@@ -165,7 +165,8 @@ def test_methods_agree_on_friction_and_small_variations_of_stiffness() -> None:
     for signal in ("overall_dte", "support_force bearing_1 x"):
         own, *others = (data["amplitude"].sel(signal=signal, line=["spur", "2 x spur"]) for data in found.values())
         for other in others:
-            assert np.abs(other.to_numpy() / own.to_numpy() - 1.0).max() < 0.02
+            # Differences are of second order in the variation of 1e-3, times the amplification.
+            assert np.abs(other.to_numpy() / own.to_numpy() - 1.0).max() < 5e-5
 
 
 def test_friction_needs_line_loads_and_a_plausible_coefficient(grc: Gearbox, stiffness: dict) -> None:

@@ -188,7 +188,7 @@ def test_the_worst_planet_is_that_of_the_life(tmp_path):
         ),
         (
             {"outputs": {"f": {"quantity": "loudest_peak", "signal": "mesh_dte x"}}, "steady": {"speeds": "0:100:5"}},
-            "no such signal; there are overall_dte, mesh_dte spur, mesh_force spur",
+            "no such signal; did you mean 'mesh_dte spur'?",
         ),
         (
             {"outputs": {"f": {"quantity": "largest_line", "line": "2 x nope"}}, "steady": {"speeds": "0:100:5"}},

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 
+import numpy as np
 import pytest
 
 from exugear.studies.executors import processes
@@ -16,6 +17,9 @@ from ..cases.study import small_study
 SEAT = {"path": "housing.factor", "values": [0.2, 0.4]}
 FREQUENCIES = {"quantity": "frequencies", "count": 2}
 DRAWN = {"path": "housing.factor", "uniform": {"min": 0.2, "max": 0.4}}
+
+
+SPEEDS = {"speeds": "800:1200:3", "at_resonances": False}
 
 
 def nearest(**options):
@@ -73,6 +77,14 @@ def nearest(**options):
             "outputs.f.harmonic = 5: a table of 8 positions has 4 harmonics",
         ),
         (
+            {"outputs": {"f": {"quantity": "loudest_peak", "signal": "support_force bearing_9"}}, "steady": SPEEDS},
+            "outputs.f.signal = 'support_force bearing_9': no such signal; did you mean 'support_force bearing_2'?",
+        ),
+        (
+            {"outputs": {"f": {"quantity": "loudest_peak", "signal": "support_force bearing_1 w"}}, "steady": SPEEDS},
+            "no such signal; did you mean 'support_force bearing_1",
+        ),
+        (
             {"outputs": {"f": {"quantity": "loudest_frequency", "from_Hz": 900.0, "to_Hz": 100.0}}},
             "outputs.f.from_Hz = 900: must be below to_Hz = 100",
         ),
@@ -97,3 +109,32 @@ def test_elements_are_those_that_modes_have(tmp_path):
     }
     study = small_study(tmp_path, outputs=outputs, parameters={"a": SEAT})
     assert not run_study(study, tmp_path / "out", processes(1)).failed
+
+
+def test_a_bearing_without_a_direction_has_its_radial_amplitude(tmp_path):
+    """The root of the sum of squares over x and y; names accepted on reading are those of the points."""
+    signals = {part: f"support_force bearing_1{part}" for part in ("", " x", " y")}
+    outputs = {f"f{part.strip()}": {"quantity": "largest_line", "line": "spur"} for part in signals}
+    for name, signal in zip(outputs, signals.values(), strict=True):
+        outputs[name]["signal"] = signal
+    steady = {"speeds": "1000:1001:2", "at_resonances": False}
+    study = small_study(tmp_path, outputs=outputs, parameters={"a": SEAT}, steady=steady)
+    data = run_study(study, tmp_path / "out", processes(1)).dataset
+    assert data["f"].values == pytest.approx(np.hypot(data["fx"], data["fy"]).values, rel=1e-3)
+
+
+def test_an_output_that_fails_leaves_the_others_of_its_point(tmp_path):
+    """No mode lies in the range; the second output of the point is that of a study without the first one."""
+    lost = {"quantity": "loudest_frequency", "from_Hz": 1.0, "to_Hz": 2.0}
+    result = run_study(
+        small_study(tmp_path, outputs={"lost": lost, **nearest()}, parameters={"a": SEAT}),
+        tmp_path / "out",
+        processes(1),
+    )
+    alone = run_study(
+        small_study(tmp_path, outputs=nearest(), parameters={"a": SEAT}), tmp_path / "alone", processes(1)
+    )
+    assert len(result.failed) == 2
+    assert np.isnan(result.dataset["lost"]).all()
+    assert result.dataset["f"].values == pytest.approx(alone.dataset["f"].values)
+    assert str(result.dataset["error"].values[0]).startswith("outputs.lost: no mode between 1 and 2 Hz")

@@ -343,7 +343,19 @@ REFUSED_PAIRS: dict[str, tuple[Gear, Gear, float, str]] = {
         spur(),
         spur(),
         0.1535,
-        r"transverse contact ratio = 0\.\d+ must be at least 1: no contact at",
+        r"transverse contact ratio = 0\.\d+ must be at least 1: contact is interrupted at",
+    ),
+    "helical teeth without overlap enough": (
+        spur(tip_diameter=154e-3, helix_angle=RIGHT, face_width=5e-3),
+        spur(name="other", tip_diameter=154e-3, helix_angle=LEFT, face_width=5e-3),
+        0.15232,
+        r"total contact ratio = 0\.\d+ \(0\.\d+ \+ 0\.09\d+\) must be at least 1: contact is interrupted at",
+    ),
+    "tips that do not reach each other": (
+        spur(),
+        spur(),
+        0.158,
+        r"transverse contact ratio = -0\.\d+ must be above zero: no contact at centre_distance = 158\.0000 mm",
     ),
     "short teeth without contact": (
         spur(tip_diameter=152e-3),

@@ -17,7 +17,7 @@ from fe_ste.elasticity.flank import FlankCompliance, flank_compliance
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.flanks import FlankModification, Relief, radius_at_roll_length_from_tip
 from fe_ste.geometry.checks import GeometryError
-from fe_ste.geometry.gears import Gear, GearPair
+from fe_ste.geometry.gears import BasicRack, Gear, GearPair
 from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
 from fe_ste.transmission_error.search import contact_state, hertz_half_width, least_contact_length
 from fe_ste.transmission_error.states import ContactState
@@ -347,6 +347,39 @@ def test_results_are_labelled_with_units(spur: PairCompliance) -> None:
     for name in (*curve.data_vars, *curve.coords):
         assert curve[name].attrs["units"]
         assert curve[name].attrs["long_name"]
+
+
+def stub_pair(overlap: float) -> GearPair:
+    """Helical teeth half as high as usual, with a transverse contact ratio of 0.777, and a stated overlap ratio."""
+    helix = math.radians(25.0)
+    width = overlap * math.pi * 3e-3 / math.sin(helix)
+    rack = BasicRack(addendum=0.5, dedendum=0.75, tip_radius=0.38)
+    teeth = {"normal_module": 3e-3, "face_width": width, "rack": rack, "tooth_thinning": 5e-5}
+    pinion = Gear(name="pinion", teeth=30, helix_angle=helix, held_diameter=15e-3, **teeth)
+    gear = Gear(name="gear", teeth=40, helix_angle=-helix, held_diameter=30e-3, **teeth)
+    return GearPair(name="stub", pinion=pinion, gear=gear, centre_distance=35 * 3e-3 / math.cos(helix))
+
+
+@pytest.mark.parametrize(("overlap", "largest_ripple"), [(1.0, 0.03), (0.6, 0.08)])
+def test_overlapping_teeth_below_a_transverse_contact_ratio_of_one_carry_the_load_throughout(
+    overlap: float, largest_ripple: float
+) -> None:
+    """Contact lines are nowhere absent; for a whole overlap ratio their length, and so the deflection, is constant."""
+    compliance = prepared(stub_pair(overlap))
+    pair = compliance.pair
+    assert pair.transverse_contact_ratio == pytest.approx(0.7766, abs=1e-4)
+    curve = static_transmission_error(compliance, 50.0, 12)
+    assert curve.converged.all()
+    assert curve.load_share.sum("tooth").values == pytest.approx(1.0, rel=1e-9)
+    cosine = math.cos(pair.pinion.base_helix_angle)
+    total = curve.line_load.sum(("tooth", "axial_position")) * compliance.slice_width / cosine
+    assert total.values == pytest.approx(50.0 / (pair.pinion.base_radius * cosine), rel=1e-9)
+    values = curve.ste.values.ravel()
+    assert np.ptp(values) < largest_ripple * values.mean()
+    # Continuous: between neighbours of twelve positions, the first behind the last, there is a part of the ripple.
+    assert np.abs(np.diff(np.append(values, values[0]))).max() < 0.5 * largest_ripple * values.mean()
+    start, end = (contact_state(compliance, 50.0, pmc).solution.approach for pmc in (0.0, 1.0))
+    assert end == pytest.approx(start, rel=1e-8)
 
 
 def test_least_contact_length_of_whole_overlaps() -> None:

@@ -131,3 +131,20 @@ def test_a_place_where_no_file_can_be_is_bad_input(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("", encoding="utf-8")
     assert exugear("new", tmp_path / "file" / "mine.toml", "--kind", "pair").exit_code == 2
     assert exugear("schema", "--out", tmp_path).exit_code == 2
+
+
+@pytest.mark.parametrize("command", [("loads",), ("losses",), ("check", "--rating")])
+def test_loads_losses_and_rating_run_on_a_new_file(case: Path, command: tuple[str, ...]) -> None:
+    verb, *options = command
+    outcome = exugear(verb, case, *options, "--out", case.parent / "out")
+    assert outcome.exit_code == 0, outcome.stderr
+    assert "Traceback" not in outcome.stderr
+
+
+@pytest.mark.validation
+@pytest.mark.parametrize("kind", RUN_IN_EACH_CHANGE)
+def test_the_life_of_a_new_file_is_long_enough(kind: str, tmp_path: Path) -> None:
+    path = tmp_path / kind / "gearbox.toml"
+    assert exugear("new", path, "--kind", kind).exit_code == 0
+    outcome = exugear("life", path, "--variant", "bushing", "--mesh-model", "iso6336", "--out", tmp_path / "out")
+    assert outcome.exit_code == 0, outcome.stderr

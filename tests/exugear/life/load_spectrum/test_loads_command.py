@@ -25,6 +25,7 @@ def loaded(tmp_path: Path, text: str, name: str = "loads.csv", **keys: object) -
     """GRC with one source beside the gearbox file."""
     (tmp_path / name).write_text(text)
     source = {"file": name, "hours_per_year": 1000.0, **keys}
+    source = {key: value for key, value in source.items() if value is not None}
     content = {**Gearbox.from_toml(GRC).content}
     content["loads"] = {"body": "carrier", "life_years": 2.0, "sources": {"bench": source}}
     return Gearbox.from_dict(content, str(tmp_path / "gearbox.toml"))
@@ -190,6 +191,44 @@ def test_more_hours_than_a_year_has_are_refused(tmp_path):
 def test_a_case_without_loads_is_bad_input(tmp_path):
     case = tmp_path / "gearbox.toml"
     assert exugear("new", case, "--kind", "pair").exit_code == 0
+    text = case.read_text(encoding="utf-8")
+    case.write_text(text[: text.index("[loads]")], encoding="utf-8")
     result = exugear("loads", case)
     assert result.exit_code == 2
     assert "loads: this section is missing" in result.stderr
+
+
+def points(**keys: object) -> Gearbox:
+    """GRC with operating points in the gearbox file itself."""
+    stated = {"torque_N_m": [1000.0, 3000.0], "speed_rpm": [10.0, 20.0], "hours": [1.0, 2.0]} | keys
+    stated = {key: value for key, value in stated.items() if value is not None}
+    content = {**Gearbox.from_toml(GRC).content}
+    content["loads"] = {"body": "carrier", "life_years": 2.0, "sources": {"bench": stated}}
+    return Gearbox.from_dict(content, "gearbox.toml")
+
+
+@pytest.mark.parametrize("keys", [{}, {"hours_per_year": 1000.0}, {"torque_factor": -1.0}])
+def test_operating_points_in_the_file_count_as_a_table_does(tmp_path, keys):
+    text = "torque_N_m,speed_rpm,hours\n1000,10,1\n3000,20,2\n"
+    table = loaded(tmp_path, text, **{"hours_per_year": None, **keys})
+    one, other = (count_loads(gearbox) for gearbox in (points(**keys), table))
+    assert one.distribution.torque == pytest.approx(other.distribution.torque)
+    assert one.distribution.hours == pytest.approx(other.distribution.hours)
+    assert one.distribution.revolutions == pytest.approx(other.distribution.revolutions)
+    assert one.sources[0].file == "gearbox.toml"
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"hours": [1.0]}, "torque_N_m, speed_rpm and hours must be stated together, with as many values"),
+        ({"speed_rpm": None}, "must be stated together"),
+        ({"file": "loads.csv"}, "a source requires file, files, or torque_N_m with speed_rpm and hours"),
+        ({"skip_s": 1.0}, "skip_s: not applicable to a table of loads"),
+        ({"hours": [8766.0, 8766.0 * 2.0]}, "hours per year in total"),
+        ({"hours": [-1.0, 1.0]}, "hours"),
+    ],
+)
+def test_operating_points_that_cannot_be_counted_are_one_error(keys, message):
+    with pytest.raises(GearboxFileError, match=message):
+        count_loads(points(**keys))

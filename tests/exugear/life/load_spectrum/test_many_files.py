@@ -207,7 +207,7 @@ SOURCE = {"skip_s": 0.0, "hours_per_year": 10.0}
         ({"files": "dlc/*.outb", "hours_table": "other.csv"}, "begins with file,hours_per_year"),
         (
             {"files": "dlc/*.outb", "file": "dlc/wind_8.outb", "hours_per_year": 1.0},
-            "a source requires file or files; set one of them",
+            "a source requires file, files, or torque_N_m",
         ),
         ({"files": "dlc/*.outb", "wind": "WindVxi"}, "requires the section .loads.wind."),
         (

@@ -27,7 +27,8 @@ PAGE = Path("docs/reference/rating.md")
 def flanks(template: str) -> tuple[FlankSheet, ...]:
     path = Path(f"exugear/gearbox/templates/{template}.toml")
     content = tomllib.loads(path.read_text(encoding="utf-8"))
-    content.setdefault("operation", {})["rated_speed_rpm"] = 1500.0
+    content["operation"] = {"rated_speed_rpm": 1500.0}
+    del content["loads"], content["lubricant"]
     bent = {"mean_stress_factor": 0.7}
     gears = {name: STRENGTH | (bent if name == "planet" else {}) for name in content["gears"]}
     content["rating"] = {"dynamic_factor": 1.05, "viscosity_40_mm2_per_s": 320.0, "gears": gears}
