@@ -234,8 +234,9 @@ def _print_changes(study: DesignStudy) -> None:
     title += f", {study.line}, dB; loads: {', '.join(study.loads)}"
     legend = "here: this peak; range: highest amplitude of any order. Only recommended changes are rated."
     print_table(title, rows, columns, legend)
-    for line in study.requirements:
-        warn(f"the unchanged gearbox fails a requirement: {line}")
+    if study.requirements:
+        more = f"; and {len(study.requirements) - 1} more" if len(study.requirements) > 1 else ""
+        warn(f"the unchanged gearbox fails requirements: {study.requirements[0]}{more}")
 
 
 def _decibels(value: float) -> str:

@@ -65,8 +65,8 @@ from exugear.steady.steady_file import settings_of, steady_path
 from fe_ste.tools.arrays import Floats
 
 SAME_FREQUENCY = 0.01
-"""Relative frequency difference within which a peak or a mode belongs to a resonance; for a mode its damping ratio, half
-of the half-power bandwidth over the frequency, where that is larger."""
+"""Relative frequency difference within which a peak or a mode belongs to a resonance. For a mode it is at least its
+damping ratio, half of the half-power bandwidth over the frequency."""
 
 
 @dataclass(frozen=True)

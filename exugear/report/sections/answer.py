@@ -293,7 +293,8 @@ def _remedy_box(material: ReportData, headline: Headline) -> Box:
     label = QUANTITIES[study.quantity]
     changes = [(gain, material.words.labelled(words)) for gain, words in best_changes(study, SHOWN_ENERGIES)]
     if not changes:
-        text = f"None of {len(study.results)} computed changes lowers the highest {label.column} in the range without "
+        count = sum(not result.refusal for result in study.results)
+        text = f"None of {count} computed changes lowers the highest {label.column} in the range without "
         return Box(f"{text}raising another quantity by 1 dB or failing a requirement.", link=CHANGES_NAME)
     text = f"Highest {label.column} in the range, recomputed; no other quantity rises by more than 1 dB."
     return Box(text, changes=changes, link=CHANGES_NAME)
