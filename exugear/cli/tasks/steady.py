@@ -312,10 +312,11 @@ def print_ranking(title: str, summary: Mapping[str, Any]) -> None:
         return
     columns = [ORDER, SPEED, Column("freq.\nHz", "frequency_Hz", partial(significant, digits=4, decimals=2))]
     legend = "Zero-to-peak amplitudes, (rank) within each quantity. TE: overall transmission error"
-    quantities = [quantity for quantity in QUANTITIES if f"{quantity}_place" in resonances[0]]
+    first = summary["ranked_by"]
+    quantities = [first, *(own for own in QUANTITIES if own != first and f"{own}_place" in resonances[0])]
     for quantity in quantities:
         columns.append(Column(_heading(quantity), partial(_amplitude, quantity)))
-        if quantity == summary["ranked_by"] and quantity != "error":
+        if quantity == first != "error":
             columns.append(Column("at", f"{quantity}_at", is_text=True))
     if "force" in quantities:
         owner = {"shafts": "shaft", "housing": "housing"}.get(summary["accelerations_of"], summary["accelerations_of"])
@@ -325,7 +326,7 @@ def print_ranking(title: str, summary: Mapping[str, Any]) -> None:
 
 
 ORDER = Column("order", "line")
-SPEED = Column("speed\nrpm", "speed_rpm", partial(significant, digits=5, decimals=2))
+SPEED = Column("speed\nrpm", "speed_rpm", partial(significant, digits=4, decimals=2))
 
 
 def _heading(quantity: str) -> str:

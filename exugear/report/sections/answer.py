@@ -41,8 +41,10 @@ COUNTED = 1e-3
 """Amplitude, over the highest of its quantity, from which a peak counts in "rank 3 of 40": 60 dB."""
 AT_RATED = 0.005
 """Relative speed difference from the rated speed that counts as none."""
-SHOWN_ENERGIES = 3
-"""Number of listed fractions of an energy, and of design changes."""
+SHOWN_FRACTIONS = 2
+"""Number of listed fractions of an energy."""
+SHOWN_CHANGES = 3
+"""Number of listed design changes."""
 SHOWN_SHORTFALLS = 3
 """Number of listed parts whose life falls short."""
 STRIPS = ((690.0, 350.0), (352.0, 440.0))
@@ -86,7 +88,8 @@ def short_section(material: ReportData) -> Part:
     assert top is not None
     mode = headline.mode_of(top)
     known = contributions_of(material.context, headline)
-    curves = headline.envelopes(material.lines)
+    found = headline.envelopes(material.lines)
+    curves = {name: found[name] for name in _sorted_quantities(headline, top) if name in found}
     answer: dict[str, Any] = {
         "scope": _scope(material, headline),
         "kicker": _kicker(headline),
@@ -96,7 +99,6 @@ def short_section(material: ReportData) -> Part:
         "sentence": _sentence(material, headline, top, mode),
         "quantities": [_quantity(material, headline, top, name) for name in _sorted_quantities(headline, top)],
         "note": _note(material, headline),
-        "ranked": f"Ranked by {QUANTITIES[headline.ranking.quantity].column}: {headline.ranking.reason}.",
         "strips": [_strips(material, headline, curves, size) for size in STRIPS if curves],
         "resonance": _resonance_box(material, headline, mode),
         "cause": _cause_box(material, top, known),
@@ -209,12 +211,17 @@ def _note(material: ReportData, headline: Headline) -> str:
         return "Amplitudes in the run-up; `exugear steady` adds bearing forces and accelerations at constant speed."
     band = material.context.gearbox.case.damping.modal_band_percent
     damping = "half to twice the value used" if band is None else f"{band[0]:g} to {band[1]:g} % of critical"
+    decides = QUANTITIES[headline.ranking.quantity].column
+    return f"Ranked by {decides} ({headline.ranking.reason}). Range of damping: {damping}."
+
+
+def _accelerations(headline: Headline) -> str:
+    """Say which parts the accelerations at bearings are of; empty without them."""
+    if "acceleration" not in headline.ranking.resonances[0].amplitudes:
+        return ""
     parts = {HOUSING: "of the housing at its bearing seats", SHAFTS: "of the shafts at bearings; the housing is rigid"}
     accelerates = parts.get(headline.ranking.accelerates, f"of {headline.ranking.accelerates} at bearings")
-    text = f"Amplitude of this order at constant speed. Damping: {damping}."
-    if "acceleration" in headline.ranking.resonances[0].amplitudes:
-        text += f" Accelerations: {accelerates}."
-    return text
+    return f" Accelerations: {accelerates}."
 
 
 def _strips(
@@ -248,8 +255,8 @@ def _resonance_box(material: ReportData, headline: Headline, mode: MatchedMode |
     return Box(
         f"Mode {mode.index + 1} at {rounded_text(mode.frequency)} Hz, damping {rounded_text(100.0 * mode.damping)} %.",
         [
-            ("Kinetic energy", percentages(moving, SHOWN_ENERGIES, 0.1)),
-            ("Strain energy", percentages(words.strain_energy(modes, mode.index), SHOWN_ENERGIES, 0.1)),
+            ("Kinetic energy", percentages(moving, SHOWN_FRACTIONS, 0.1)),
+            ("Strain energy", percentages(words.strain_energy(modes, mode.index), SHOWN_FRACTIONS, 0.1)),
         ],
         picture=picture,
         link="modes",
@@ -286,12 +293,12 @@ def _remedy_box(material: ReportData, headline: Headline) -> Box:
     """Show the best computed changes, or the command that computes them: estimates are no advice."""
     study = study_of(material.design_study, headline)
     if study is None:
-        command = f"`{shlex.join(['exugear', 'report', str(material.context.folder), '--levers'])}`"
+        command = shlex.join(["exugear", "report", str(material.context.folder), "--levers"])
         if headline.response is None:
-            command = f"`exugear steady`, then {command}"
-        return Box(f"Design changes are not computed: {command}. Sensitivities of the mode are no design changes.")
+            command = f"exugear steady, then {command}"
+        return Box(f"No design changes are computed. Run: {command}")
     label = QUANTITIES[study.quantity]
-    changes = [(gain, material.words.labelled(words)) for gain, words in best_changes(study, SHOWN_ENERGIES)]
+    changes = [(gain, material.words.labelled(words)) for gain, words in best_changes(study, SHOWN_CHANGES)]
     if not changes:
         count = sum(not result.refusal for result in study.results)
         text = f"None of {count} computed changes lowers the highest {label.column} in the range without "
@@ -310,7 +317,7 @@ def _further(
         yield "Highest in other quantities", leaders
     rated = material.context.gearbox.case.operation.rated_speed_rpm
     if rated is not None and curves:
-        yield f"At rated speed, {rounded_text(rated)} rpm", _rated_lines(headline, top, curves, rated)
+        yield f"At rated speed, {rounded_text(rated)} rpm", _rated_lines(headline, curves, rated)
     outside = headline.outside()
     if outside is not None:
         peaks = ", ".join(amplitude_text(name, own.amplitude) for name, own in outside.amplitudes.items())
@@ -348,8 +355,8 @@ def _leaders(material: ReportData, headline: Headline, top: Resonance) -> Iterat
         )
 
 
-def _rated_lines(headline: Headline, top: Resonance, curves: Mapping[str, Envelope], rated: float) -> list[str]:
-    """Return the amplitudes at rated speed, and which of them exceed the headline."""
+def _rated_lines(headline: Headline, curves: Mapping[str, Envelope], rated: float) -> list[str]:
+    """Return the amplitudes at rated speed, and which of them exceed all resonances."""
     values = {
         name: float(np.interp(rated * RPM, curve.speed, curve.amplitude))
         for name, curve in curves.items()
@@ -365,9 +372,10 @@ def _rated_lines(headline: Headline, top: Resonance, curves: Mapping[str, Envelo
     text = ", ".join(amplitude_text(name, value) for name, value in values.items())
     at = f" Resonance {near[0]} of the ranking." if near else ""
     lines = [f"{text[0].upper()}{text[1:]}.{at}"]
-    if values.get(headline.ranking.quantity, 0.0) > top.amplitudes[headline.ranking.quantity].amplitude:
-        column = QUANTITIES[headline.ranking.quantity].column
-        lines.append(f"The {column} at rated speed is higher than at the highest resonance.")
+    for name, value in values.items():
+        leader = headline.ranking.leader(name)
+        if leader is not None and value > leader.amplitudes[name].amplitude:
+            lines.append(f"The {QUANTITIES[name].column} there is higher than at any resonance in the range.")
     return lines
 
 
@@ -426,7 +434,7 @@ def ranking_section(material: ReportData) -> Part:
         "ranking",
         table=table,
         whole=headline.ranking.whole,
-        note_text=_note(material, headline),
+        note_text=_note(material, headline) + _accelerations(headline),
         speed_label=f"{material.input_words} speed / rpm",
         three=len(shown[0].amplitudes) > 1,
         diagrams=[_campbell(material, headline, size) for size in CAMPBELL],

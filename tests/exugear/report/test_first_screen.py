@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import html
 import io
 import json
 import re
@@ -82,6 +83,80 @@ def test_a_higher_peak_outside_the_operating_range_does_not_lead(folder, told, t
     assert amplitude and float(amplitude[1]) > 0.1 * told["resonances"][0]["force_N"]
 
 
+def rows_of(page: str, table: str) -> list[dict[str, str]]:
+    """Cells of a table of the page by their label."""
+    (body,) = re.findall(rf'<table id="{table}".*?</table>', page, re.DOTALL)
+    rows = re.findall(r"<tr.*?</tr>", body.split("<tbody>")[1], re.DOTALL)
+    cell = r'<t[dh][^>]*data-label="([^"]*)"[^>]*>(.*?)</t[dh]>'
+    return [{label: re.sub(r"<[^>]*>", "", text).strip() for label, text in re.findall(cell, row)} for row in rows]
+
+
+FACTORS = {"force_N": 1e-3, "error_m": 1e6, "acceleration_m_per_s2": 1.0}
+COLUMNS = {
+    "force": "bearing force ± / kN",
+    "error": "transmission error ± / µm",
+    "acceleration": "acceleration at bearings ± / m/s²",
+}
+
+
+@pytest.mark.validation
+def test_all_numbers_of_the_page_are_those_of_one_list(folder, told):
+    """Headline, quantities, bands, leaders, ranking and the panels of single resonances, each read from the page."""
+    page = html.unescape((folder / "report.html").read_text(encoding="utf-8"))
+    listed = told["resonances"]
+    first = listed[0]
+    # The ranking has the list, and the headline is its first row.
+    rows = rows_of(page, "resonances")
+    for row, own in zip(rows, listed, strict=False):
+        assert float(row["speed / rpm"]) == pytest.approx(abs(own["speed_rpm"]), rel=5e-3)
+        assert float(row["frequency / Hz"]) == pytest.approx(own["frequency_Hz"], rel=5e-3)
+        for (key, factor), label in zip(FACTORS.items(), COLUMNS.values(), strict=True):
+            assert float(row[label]) == pytest.approx(factor * own[key], rel=5e-3, abs=1e-9)
+    large = re.findall(r'<p class="large">(.*?)</p>', page)[0]
+    frequency, speed = re.findall(r"<strong>([\d.]+) (?:Hz|rpm)", large)
+    assert (frequency, speed) == (rows[0]["frequency / Hz"], rows[0]["speed / rpm"])
+    (quantities,) = re.findall(r'<table class="quantities">.*?</table>', page, re.DOTALL)
+    for name, label in COLUMNS.items():
+        (shown,) = re.findall(rf'<tr class="{name}">(.*?)</tr>', quantities, re.DOTALL)
+        value, unit, band = re.search(r"±([^ ]+) <small>(.*?)</small></td><td[^>]*>(.*?)</td>", shown).groups()
+        assert (value, unit) == (rows[0][label], label.rsplit("/ ", 1)[-1] if name != "acceleration" else "m/s²")
+        key = next(key for key in FACTORS if key.startswith(name))
+        ends = [first[f"{name}_{end}_damping_{key.removeprefix(name + '_')}"] for end in ("highest", "lowest")]
+        factor = FACTORS[key]
+        assert [float(end) for end in band.split(" to ")] == pytest.approx([factor * end for end in ends], rel=5e-3)
+    # The deciding quantity is highest in the first resonance, and the leaders of the others are listed.
+    assert first["force_place"] == 1 and first["force_N"] == max(own["force_N"] for own in listed if own["force_place"])
+    for name, key in (("error", "error_m"), ("acceleration", "acceleration_m_per_s2")):
+        leader = next(own for own in listed if own[f"{name}_place"] == 1)
+        title = {"error": "Transmission error", "acceleration": "Acceleration at bearings"}[name]
+        (line,) = [text for text in told["statements"] if text.startswith(f"Highest in other quantities: {title}")]
+        if leader is first:
+            assert line.endswith("this resonance.")
+            continue
+        value, at, turns = re.search(r"±([\d.e+-]+).*?, ([\d.]+) Hz at ([\d.]+) rpm", line).groups()
+        assert float(value) == pytest.approx(FACTORS[key] * leader[key], rel=5e-3)
+        assert [float(at), float(turns)] == pytest.approx([leader["frequency_Hz"], abs(leader["speed_rpm"])], rel=5e-3)
+    # "Damping does not change the first rank" is said only if the ranks over the range of damping say so.
+    stays = any("Damping does not change the first rank" in text for text in told["statements"])
+    assert stays == (first["force_places_over_damping"] == [1, 1])
+    # Each row of "Resonances by model" has the speed and the level of the panel that opens from it.
+    data = json.loads(re.search(r'id="data">(.*?)</script>', page, re.DOTALL)[1])
+    compared = 0
+    for group in data["groups"]:
+        for name, variant in group["variants"].items():
+            (table,) = re.findall(rf'<table id="ranking-{group["name"]}-{name}".*?</table>', page, re.DOTALL)
+            head = re.findall(r"<th[^>]*>(.*?)</th>", table)
+            rows = re.findall(r"<tr data-choice.*?</tr>", table, re.DOTALL)
+            for row, panel in zip(rows, variant["resonances"], strict=True):
+                values = [re.sub(r"<[^>]*>", "", cell) for cell in re.findall(r"<td.*?>(.*?)</td>", row, re.DOTALL)]
+                shown = dict(zip(head, values, strict=True))
+                assert float(shown["Speed / rpm"]) == pytest.approx(panel["speed"], rel=1e-3)
+                assert float(shown["Level / dB"]) == pytest.approx(panel["level"], abs=0.06)
+                assert shown["Excited by"] == data["lines"][panel["line"]]["short"]
+                compared += 1
+    assert compared > 5
+
+
 class TestInABrowser:
     pytestmark = IN_BROWSER
 
@@ -95,8 +170,7 @@ class TestInABrowser:
         assert float(row.locator("[data-label='frequency / Hz']").inner_text()) == frequency
         assert float(row.locator("[data-label='speed / rpm']").inner_text()) == speed
         values = view.page.locator(".quantities .value").all_inner_texts()
-        factors = {"force_N": 1e-3, "error_m": 1e6, "acceleration_m_per_s2": 1.0}
-        for shown, (key, factor) in zip(values, factors.items(), strict=True):
+        for shown, (key, factor) in zip(values, FACTORS.items(), strict=True):
             assert float(shown.split()[0].removeprefix("±")) == pytest.approx(factor * first[key], rel=5e-3)
         assert f"Highest resonance: {frequency:.0f} Hz" in " ".join(told["statements"])
         # The panel next to the waterfall shows it at this speed, not where its mode is excited most at any speed.
