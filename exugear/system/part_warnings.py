@@ -479,10 +479,11 @@ def pair_warnings(gearbox: Gearbox) -> Iterator[str]:
                     f"the truncated load; {1e3 * _clear_tip_diameter(spec.pair, mate):.6g} leaves "
                     f"{100 * PROPOSED_MARGIN:g} %"
                 )
-        if spec.pair.transverse_contact_ratio < 1.0:
+        pair = spec.pair
+        if pair.transverse_contact_ratio < 1.0:
             yield (
-                f"pairs.{name}: transverse contact ratio {spec.pair.transverse_contact_ratio:.3f}, continuous contact by "
-                f"the overlap ratio {spec.pair.overlap_ratio:.3f}; ISO 6336 does not cover such teeth; check tip diameters "
+                f"pairs.{name}: transverse contact ratio {pair.transverse_contact_ratio:.3f}, continuous contact by "
+                f"the overlap ratio {pair.overlap_ratio:.3f}; ISO 6336 does not cover such teeth; check tip diameters "
                 "and centre distance unless it is intended"
             )
         if margins.pitch_point_pressure > LARGEST_PRESSURE:
