@@ -39,6 +39,7 @@ LONG = (
     "solids_in_python",
     "studies",
     "te_tables_over_load",
+    "torque_series",
 )
 NEEDS_GMSH = ("flexible_bodies", "solids_in_python")
 

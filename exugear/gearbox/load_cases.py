@@ -233,6 +233,25 @@ def load_warnings(loads: LoadSummary) -> tuple[str, ...]:
     return tuple(doubts)
 
 
+def missing_torque_warning(gearbox: Gearbox, case: LoadCase) -> str:
+    """Return a warning if an end of a train with several degrees of freedom carries no torque; empty otherwise.
+
+    A train with n degrees of freedom has n + 1 ends: those that `static_load` loads or locks. An end without torque
+    accelerates freely, and takes the power of the others.
+    """
+    if gearbox.train.degrees_of_freedom < 2:
+        return ""
+    acting = {*case.torques, *torque_series(gearbox, case), case.driven_body}
+    ends = dict.fromkeys((*gearbox.case.static_load.torques_N_m, *gearbox.locked))
+    free = [body for body in ends if body not in acting]
+    if not free:
+        return ""
+    return (
+        f"no torque on {', '.join(free)}: the gear train has {gearbox.train.degrees_of_freedom} degrees of freedom, so "
+        "nothing resists there and it speeds up freely; add the torque to torques_N_m, or state it as 0"
+    )
+
+
 def bearing_range_warning(gearbox: Gearbox, loads: LoadSummary, variant: str) -> str:
     """Return a warning if linear bearings leave the load range around their linearisation point; empty otherwise.
 

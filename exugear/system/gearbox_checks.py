@@ -21,7 +21,7 @@ from exugear.system.bearings.rolling.catalogue import catalogue_rows
 from exugear.system.bearings.rolling.friction import friction_series
 from exugear.system.bearings.rolling.rows import BearingError
 from exugear.system.bearings.stiffness import elastic_names, linear_law, misplaced_factor, mounts_at_work, unsupported
-from exugear.system.bodies.of_gearbox import check_elastic_body, narrowed_seats
+from exugear.system.bodies.of_gearbox import check_elastic_body, check_shape, narrowed_seats
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.system.part_warnings import pair_warnings, part_warnings
 from exugear.system.tooth_mesh.placement import MeshError, line_of_action_row, loaded_flanks, tooth_places
@@ -162,6 +162,8 @@ def check_parts(gearbox: Gearbox) -> None:
     attempts += [partial(gearbox.table_distances, name) for name in _pairs_with_axes(gearbox)]
     attempts += [partial(torque_series, gearbox, case) for case in gearbox.load_cases.values()]
     attempts += [partial(_build_elastic_body, gearbox, name) for name in elastic_names(gearbox)]
+    elastic = {gearbox.body(name).family for name in elastic_names(gearbox)}
+    attempts += [partial(check_shape, gearbox, name) for name in gearbox.case.bodies if name not in elastic]
     errors: list[str] = []
     for attempt in attempts:
         try:

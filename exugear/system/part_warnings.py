@@ -14,10 +14,11 @@ from dataclasses import dataclass, replace
 
 from exugear.gearbox.gear_parts import thinning_range
 from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.load_cases import operating_range, summarise_loads
 from exugear.gearbox.parts import Bearing, Body, PairSpec
 from exugear.gearbox.sections.connections import CatalogueSection
-from exugear.gearbox.units import MM
-from exugear.system.bearings.rolling.dimensions import boundary_of
+from exugear.gearbox.sections.designations import boundary_of
+from exugear.gearbox.units import MM, RPM
 from fe_ste.geometry.checks import USUAL_TIP_THICKNESS
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.transmission_error.search import pitch_point_pressure
@@ -58,6 +59,36 @@ def part_warnings(gearbox: Gearbox) -> Iterator[str]:
     yield from _backlashes(gearbox)
     yield from _shafts_on_one_bearing(gearbox)
     yield from _faces_in_bearings(gearbox)
+    yield from _speed_limits(gearbox)
+
+
+def _speed_limits(gearbox: Gearbox) -> Iterator[str]:
+    """Compare seals and bearings with their speed limits, at the highest speed of operation and of all load cases."""
+    limited = [one for one in gearbox.bearings if one.catalogue and one.catalogue.speed_limit_rpm]
+    if not gearbox.case.seals and not limited:
+        return
+    fastest = (operating_range(gearbox) or (0.0, 0.0))[1]
+    for case in gearbox.load_cases.values():
+        fastest = max(fastest, summarise_loads(gearbox, case).fastest_speed)
+    speeds = gearbox.train.rolling_speeds(gearbox.case.overall.input, fastest)
+    at = f"at {fastest / RPM:.4g} rpm of {gearbox.case.overall.input}"
+    for name, seal in gearbox.case.seals.items():
+        turns = abs(speeds.get(seal.body, 0.0) - speeds.get(seal.on, 0.0))
+        speed = 0.5 * MM * seal.diameter_mm * turns
+        if speed > seal.speed_limit_m_per_s:
+            usual = "" if "speed_limit_m_per_s" in seal.model_fields_set else " usual for nitrile rubber (NBR)"
+            yield (
+                f"seals.{name}: the lip slides at {speed:.3g} m/s {at}, above {seal.speed_limit_m_per_s:g} m/s{usual}; "
+                "reduce the speed, or set speed_limit_m_per_s of its material"
+            )
+    for bearing in limited:
+        assert bearing.catalogue is not None
+        turns = abs(speeds.get(bearing.body, 0.0) - speeds.get(bearing.on, 0.0)) / RPM
+        if turns > (bearing.catalogue.speed_limit_rpm or math.inf):
+            yield (
+                f"bearings.{bearing.family}: turns at {turns:.4g} rpm {at}, above speed_limit_rpm = "
+                f"{bearing.catalogue.speed_limit_rpm:g}"
+            )
 
 
 def _masses(gearbox: Gearbox) -> Iterator[str]:
@@ -448,6 +479,13 @@ def pair_warnings(gearbox: Gearbox) -> Iterator[str]:
                     f"the truncated load; {1e3 * _clear_tip_diameter(spec.pair, mate):.6g} leaves "
                     f"{100 * PROPOSED_MARGIN:g} %"
                 )
+        pair = spec.pair
+        if pair.transverse_contact_ratio < 1.0:
+            yield (
+                f"pairs.{name}: transverse contact ratio {pair.transverse_contact_ratio:.3f}, continuous contact by "
+                f"the overlap ratio {pair.overlap_ratio:.3f}; ISO 6336 does not cover such teeth; check tip diameters "
+                "and centre distance unless it is intended"
+            )
         if margins.pitch_point_pressure > LARGEST_PRESSURE:
             yield (
                 f"pairs.{name}: Hertzian stress {1e-6 * margins.pitch_point_pressure:.4g} MPa at the pitch point "

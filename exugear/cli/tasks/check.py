@@ -20,6 +20,7 @@ from exugear.gearbox.load_cases import (
     band_warning,
     bearing_range_warning,
     load_warnings,
+    missing_torque_warning,
     other_load_warning,
     summarise_loads,
 )
@@ -162,6 +163,7 @@ def _pair_summary(gearbox: Gearbox, name: str) -> dict[str, Any]:
         "pitch_point_pressure_MPa": 1e-6 * margins.pitch_point_pressure,
         "margin_to_form_diameter": [None if math.isnan(margin) else margin for margin in margins.form],
         "tip_thickness_in_modules": list(margins.tip_thickness),
+        "held_diameter_mm": [1e3 * gear.held_diameter for gear in (pair.pinion, pair.gear)],
         "backlash_um": [1e6 * play for play in backlash_range(gearbox, pair)],
         "normal_backlash_um": 1e6 * pair.normal_backlash,
     }
@@ -257,6 +259,7 @@ def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
                 "reversed_flanks": list(loads.reversed_flanks),
                 "doubts": [
                     *load_warnings(loads),
+                    *filter(None, [missing_torque_warning(gearbox, case)]),
                     *filter(None, [bearing_range_warning(gearbox, loads, Variant.bushing)]),
                     *filter(None, [other_load_warning(gearbox, loads)]),
                     *filter(None, [band_warning(loads, BAND)]),
@@ -272,7 +275,8 @@ PAIR_LEGEND = "Gear 1 is the first gear of the pair; torque: static torque of th
 MARGIN_LEGEND = (
     "Contact stress: Hertz, at the pitch point under the static torque of gear 1, even load distribution, no load "
     "factors. SAP: start of active profile; its distance from the root form diameter in % of the profile length "
-    "(roll length). Backlash: circumferential, on the working circle."
+    "(roll length). Backlash: circumferential, on the working circle. Held at: held_diameter_mm, at which the tables "
+    "fix the gear body; a smaller one of an external gear lowers the mesh stiffness."
 )
 LOAD_LEGEND = "*: the speed of a body is prescribed (driven_body). "
 REVERSED_LEGEND = "!: the flank opposite to the flank loaded by the static load."
@@ -318,10 +322,11 @@ def _joined(form: str, factor: float = 1.0) -> Callable[[Iterable[float]], str]:
 
 MARGINS = (
     Column("pair", "pair"),
-    Column("contact stress at\npitch point MPa", "pitch_point_pressure_MPa", ".0f"),
+    Column("contact stress\nat pitch MPa", "pitch_point_pressure_MPa", ".0f"),
     Column("SAP above root\nform dia. %", "margin_to_form_diameter", _percent),
     Column("backlash\nµm", "backlash_um", _backlash),
     Column("tip thickness\ns_an/m_n", "tip_thickness_in_modules", _joined(".2f")),
+    Column("held at\nmm", "held_diameter_mm", _joined("g")),
 )
 THICKNESSES = (
     Column("gear", "gear"),

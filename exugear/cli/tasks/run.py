@@ -16,6 +16,7 @@ from exugear.gearbox.load_cases import (
     bearing_range_warning,
     friction_warning,
     load_warnings,
+    missing_torque_warning,
     other_load_warning,
     summarise_loads,
 )
@@ -163,7 +164,9 @@ def _warn_before_run(project: Project, duration: float | None, band: float) -> N
     of_bearings = bearing_range_warning(project.gearbox, loads, project.choice.variant)
     of_tables = other_load_warning(project.gearbox, loads, law.uses_single_load)
     of_friction = friction_warning(project.gearbox, loads)
-    for doubt in filter(None, (*load_warnings(loads), of_bearings, of_tables, band_warning(loads, band), of_friction)):
+    of_ends = missing_torque_warning(project.gearbox, load_case)
+    of_band = band_warning(loads, band)
+    for doubt in filter(None, (*load_warnings(loads), of_ends, of_bearings, of_tables, of_band, of_friction)):
         warn(f"load_cases.{load_case.name}: {doubt}")
 
 

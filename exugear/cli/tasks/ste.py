@@ -202,7 +202,8 @@ def _draw_contacts(requests: list[TableRequest], tables: dict[str, MeshTable], f
 TABLE_LEGEND = (
     "Torque: of gear 1. TE: transmission error, mean and peak-to-peak (p-p) over the mesh cycle. Stiffness: mean mesh "
     "stiffness. Stress: maximum contact stress of the mesh cycle without tip-edge contact; at the pitch point: Hertz, "
-    "even load distribution. Aligned gears, no load factors. States conv.: converged of all states of the table."
+    "even load distribution. Aligned gears, no load factors. States conv.: converged of all states of the table. Gears "
+    "are held at held_diameter_mm: what lies between it and the teeth is part of the stiffness."
 )
 REFERENCE_LEGEND = (
     "Torque: of gear 1. TE: transmission error, mean and peak-to-peak (p-p), by the nonlinear reference analysis; "

@@ -41,7 +41,9 @@ class LoadCaseSection(Section):
     torques_N_m: dict[Name, q.TorqueNm] = {}
     """Constant torques on the gearbox by body, positive about +z."""
     torque_series: FileName | None = None
-    """CSV file of torques over time, in the folder of the gearbox file."""
+    """CSV file of torques over time, in the folder of the gearbox file: `time_s`, and `BODY_N_m` for each loaded body;
+    linear between rows.
+    """
     duration_s: q.DurationS = 30.0
     """Simulated time."""
     start_speed_rpm: q.SpeedRpm = 0.0

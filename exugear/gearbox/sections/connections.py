@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from exugear.gearbox.sections import entries as q
+from exugear.gearbox.sections.designations import boundary_of
 from exugear.gearbox.sections.entries import (
     GROUND,
     MOST_PLANETS,
@@ -158,7 +159,9 @@ class CatalogueSection(Section):
     type: BearingType
     """Type of the bearing."""
     designation: Text = ""
-    """Designation for the user; `check` compares bore and outer diameter with ISO 15 and ISO 355."""
+    """Designation such as "6307". If the program has its dimensions (ISO 15, ISO 355), type, bore, outer diameter and
+    width follow from it; `check` compares stated ones.
+    """
     series: Text = ""
     """Series whose constants the frictional moment takes; by default that of the designation."""
     bore_mm: q.LengthMm
@@ -212,10 +215,31 @@ class CatalogueSection(Section):
     fatigue_load_limit_kN: q.RatingKN | None = None
     """Fatigue load limit C_u (P_u) of the catalogue, for a pair that of both bearings; according to ISO 281 by default.
     """
+    speed_limit_rpm: q.SpeedLimitRpm | None = None
+    """Limiting speed of the catalogue, inner relative to outer ring, above which `check` warns."""
     radial_load_kN: q.RadialLoadKN | None = None
     """Radial load at which the stiffness applies; by default that of the static state."""
     axial_load_kN: q.AxialLoadKN | None = None
     """Axial load in addition to the radial load."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _completed_by_designation(cls, content: Any) -> Any:
+        if not isinstance(content, dict) or not isinstance(content.get("designation"), str):
+            return content
+        keys = ("type", "bore_mm", "outer_diameter_mm", "width_mm")
+        if all(key in content for key in keys):
+            return content
+        known = boundary_of(content["designation"])
+        if known is not None:
+            values = (known.type, known.bore, known.outer, known.width)
+            return dict(zip(keys, values, strict=True)) | content
+        if not any(key in content for key in keys):
+            raise ValueError(
+                f"designation = {content['designation']!r}: the program has no dimensions of it; set type, bore_mm, "
+                "outer_diameter_mm and width_mm"
+            )
+        return content
 
     @model_validator(mode="after")
     def _keys_of_the_type(self) -> CatalogueSection:
@@ -335,13 +359,25 @@ class BearingSection(Section):
     outer_ring: Literal["body", "on"] | None = None
     """Body that carries the outer ring; by default a planet does, other bodies do not."""
     designation: Text = ""
-    """Designation for the user; a bearing without other data can be used only in the variant `rigid`."""
+    """Designation, which stands for a [.catalogue] table if the program has its dimensions; other bearings without data
+    can be used only in the variant `rigid`.
+    """
     stiffness: StiffnessSection | None = None
     """Specified stiffness, or minimum stiffness with catalogue data."""
     catalogue: CatalogueSection | None = None
     """Catalogue data."""
     damping: ConnectorDampingSection | None = None
     """Damping; proportional to the stiffness by default."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _completed_by_designation(cls, content: Any) -> Any:
+        if not isinstance(content, dict) or {"stiffness", "catalogue"} & set(content):
+            return content
+        designation = content.get("designation")
+        if isinstance(designation, str) and boundary_of(designation) is not None:
+            return content | {"catalogue": {"designation": designation}}
+        return content
 
     @model_validator(mode="after")
     def _source(self) -> BearingSection:
@@ -416,6 +452,10 @@ class SealSection(Section):
     """Body that holds the seal: `ground`, a fixed body, a carrier, another shaft."""
     diameter_mm: q.LengthMm
     """Diameter of the shaft under the lip."""
+    speed_limit_m_per_s: q.SealSpeed = 14.0
+    """Permissible circumferential speed, above which `check` warns; 14 m/s is usual in catalogues for nitrile rubber
+    (NBR), other materials permit more.
+    """
 
 
 Phases = Annotated[

@@ -138,6 +138,8 @@ Osculation = Annotated[float, Range(0.5, 0.9999, (0.93, 0.995), "radius of the b
 ProfileShare = Annotated[float, Range(0.0, 1.0, why="share of half the roller's length")]
 AxialPreloadUm = Annotated[float, _symmetric_range(2000.0, 200.0)]
 RatingKN = Annotated[float, Range(1e-3, 1e6, (0.1, 5e4))]
+SealSpeed = Annotated[float, Range(0.1, 200.0, (1.0, 60.0), "m/s of the shaft under the lip")]
+SpeedLimitRpm = Annotated[float, Range(0.1, 1e6, (10.0, 1e5), "limiting speed of the bearing's catalogue")]
 RadialLoadKN = Annotated[float, Range(0.0, 1e5, (0.0, 2e4))]
 AxialLoadKN = Annotated[float, _symmetric_range(1e5, 2e4)]
 SeatFactor = Annotated[float, Range(1e-3, 1.0)]

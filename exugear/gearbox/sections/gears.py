@@ -155,7 +155,10 @@ class GearSection(Section):
     face_width_mm: q.FaceWidthMm
     """Face width."""
     held_diameter_mm: q.LengthMm
-    """Diameter fixed in the finite-element model: bore of an external gear, outside of the rim of a ring gear."""
+    """Diameter fixed in the finite-element model: bore of an external gear, outside of the rim of a ring gear. The body
+    between it and the teeth deflects with them: with 20 and 30 mm instead of 45 and 90 mm, the mesh stiffness of the
+    template `pair` is 399 instead of 743 N/µm.
+    """
     internal: bool = False
     """Whether the gear is a ring gear with internal teeth."""
     tooth_thinning_mm: q.ThinningMm = 0.0

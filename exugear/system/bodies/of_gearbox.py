@@ -29,7 +29,15 @@ from exugear.gearbox.units import GPA, MM
 from exugear.system.bearings.stiffness import elastic_names, mounts_at_work
 from exugear.system.bodies.elastic_body import ElasticBody, FloatingBody
 from exugear.system.bodies.reduction import Blank, Frame, ReducedBody, ReductionError, RigidInertia, with_rigid_inertia
-from exugear.system.bodies.shaft_sections import MeshSize, SeatBand, ShaftError, ShaftSection, check_shaft, narrowed
+from exugear.system.bodies.shaft_sections import (
+    MeshSize,
+    SeatBand,
+    ShaftError,
+    ShaftSection,
+    check_sections,
+    check_shaft,
+    narrowed,
+)
 from exugear.system.bodies.solid_elements import SolidError, SolidSeat
 from exugear.system.bodies.solid_files import GEOMETRY, MESHES, UNPERMITTED, SolidFile
 from exugear.system.bodies.solids import (
@@ -531,6 +539,23 @@ def check_elastic_body(gearbox: Gearbox, name: str) -> None:
     try:
         start = MM * _shape_of(gearbox, gearbox.body(name)).start_z_mm
         check_shaft(model.sections, model.seats, start=start)
+    except ShaftError as error:
+        raise gearbox.error(f"bodies.{family}.shape: {error}") from None
+
+
+def check_shape(gearbox: Gearbox, family: str) -> None:
+    """Refuse the shape of a body, rigid or flexible, whose sections do not touch each other.
+
+    Raises
+    ------
+    GearboxFileError
+        One of them fits into the bore of its neighbour.
+    """
+    shape = gearbox.case.bodies[family].shape
+    if shape is None:
+        return
+    try:
+        check_sections(tuple(map(_section_of, shape.sections)))
     except ShaftError as error:
         raise gearbox.error(f"bodies.{family}.shape: {error}") from None
 

@@ -94,6 +94,7 @@ def test_check(printed: Printed) -> None:
             "pitch_point_pressure_MPa": 1234.0,
             "margin_to_form_diameter": [0.123, None],
             "tip_thickness_in_modules": [0.57, 0.75],
+            "held_diameter_mm": [120.0, 1180.0],
             "backlash_um": [1012.0, 1134.0, 1245.0],
         }
         for name in NAMES

@@ -21,6 +21,7 @@ from exugear.steady.steady_file import load_response, steady_path, stored_or_com
 from exugear.system.build import assemble
 
 from ..cases.command import exugear
+from ..cases.spur import SPUR_CASE
 
 CHOICE = Choice("bushing", "line_of_action", "assemblies")
 SETTINGS = SteadySettings(SpeedRange.from_text("-10:-35:60"), harmonics=3)
@@ -119,3 +120,28 @@ def test_highest_amplitudes_are_of_the_range_and_zero_has_no_decibels() -> None:
     assert highest_within(curve, (4.0, 5.0)) is None
     assert change_in_decibels(Highest(1.0, 1.0), Highest(10.0, 2.0)) == pytest.approx(20.0)
     assert math.isnan(change_in_decibels(Highest(0.0, 1.0), Highest(1.0, 1.0)))
+
+
+def case_in(folder: Path) -> Path:
+    case = folder / "my" / "gearbox.toml"
+    case.parent.mkdir()
+    case.write_text(SPUR_CASE, encoding="utf-8")
+    return case.relative_to(folder)
+
+
+def test_a_gearbox_file_without_results_names_their_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    missing = exugear("report", case_in(tmp_path))
+    assert missing.exit_code == 2
+    assert "results/my: no such folder; specify the results folder of `exugear run`" in missing.stderr
+
+
+@pytest.mark.validation
+def test_a_gearbox_file_stands_for_its_results_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    case = case_in(tmp_path)
+    modes = exugear("modes", case, "--variant", "rigid", "--mesh-model", "iso6336")
+    assert modes.exit_code == 0, modes.stderr
+    report = exugear("report", case)
+    assert report.exit_code == 0, report.stderr
+    assert (tmp_path / "results" / "my" / "report.html").is_file()

@@ -19,8 +19,8 @@ from exugear.exchange.rexs.to_case.bodies import (
 from exugear.exchange.rexs.to_case.notes import Block, Entry, Notes, Places, assumed, derived, entries_of, read, tidy
 from exugear.exchange.rexs.tree import Component, Model, RexsError, plain
 from exugear.gearbox.sections.connections import CONTACT_ANGLES_DEG, TYPES_OF_KEYS
+from exugear.gearbox.sections.designations import boundary_of
 from exugear.gearbox.units import MM
-from exugear.system.bearings.rolling.dimensions import boundary_of
 
 CYLINDERS = TYPES_OF_KEYS["ribs"][0]
 """Types of roller bearings that locate a shaft axially only by ribs."""
@@ -190,7 +190,10 @@ def _support(model: Model, part: Component, sense: int, notes: Notes) -> dict[st
     else:
         why = "no dimensions in the file or in the built-in tables; set its catalogue data or its stiffness"
     notes.changed.append(f"{part}: BLANK, {why}; until then only the variant rigid runs")
-    return {"designation": Block("", {"designation": Entry(_designation(part), f"BLANK: {why}")})}
+    name = _designation(part)
+    if boundary_of(name) is not None:  # its dimensions are not those of a bearing that can be modelled
+        name = f"not modelled: {name}"
+    return {"designation": Block("", {"designation": Entry(name, f"BLANK: {why}")})}
 
 
 def _arrangement(model: Model, part: Component, sense: int) -> dict[str, Entry]:

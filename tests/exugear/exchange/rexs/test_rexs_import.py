@@ -17,7 +17,7 @@ from exugear.exchange.rexs.parsing import parse_model
 from exugear.exchange.rexs.to_case.conversion import to_case
 from exugear.exchange.rexs.tree import Attribute, RexsError
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.bearings.rolling.dimensions import boundary_of
+from exugear.gearbox.sections.designations import boundary_of
 from exugear.system.gearbox_checks import lacking
 
 from ...cases.command import exugear

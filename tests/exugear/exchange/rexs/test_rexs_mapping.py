@@ -249,7 +249,7 @@ def test_a_tapered_bearing_with_dimensions_holds_the_way_it_says(absorbed, towar
 
 def test_a_bearing_of_a_kind_without_law_is_a_blank_with_its_name():
     made = to_case(with_values(SEW, {20: {"bearing_type": "axial_grooved_ball_bearing"}}), "case")
-    assert made.gearbox.unknown_bearings == {"bearing_1": "6305-2Z"}
+    assert made.gearbox.unknown_bearings == {"bearing_1": "not modelled: 6305-2Z"}
     assert any("axial_grooved_ball_bearing has no bearing model" in line for line in made.changed)
 
 
@@ -287,7 +287,7 @@ def test_a_file_without_torque_gets_one_that_is_marked():
 
 def test_a_fault_of_the_gearbox_file_names_the_components_it_is_about():
     with pytest.raises(RexsError, match="^pairs.stage_1: .*pairs.stage_1 is cylindrical_stage 6 'Stirnradstufe'"):
-        gearbox_of(with_values(SEW, {34: {"root_diameter": 79.0}}))
+        gearbox_of(with_values(SEW, {34: {"tip_diameter": 86.0}}))
 
 
 def test_a_carrier_that_is_joined_with_the_casing_makes_a_star():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from exugear.system.bearings.rolling.dimensions import boundary_of
+from exugear.gearbox.sections.designations import boundary_of
 
 PRINTED = {
     "6000": (10.0, 26.0, 8.0),
