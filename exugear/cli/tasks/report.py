@@ -28,7 +28,7 @@ from exugear.gearbox.variant import Variant
 from exugear.project import default_folder
 from exugear.report.design_study import at_load
 from exugear.report.findings.context import ReportError, choice_of
-from exugear.report.findings.design_changes import LEAST_DB, DesignStudy
+from exugear.report.findings.design_changes import LEAST_DB, DesignStudy, settings_of_study
 from exugear.report.findings.other_design import check_ranges
 from exugear.report.findings.words import QUANTITIES
 from exugear.report.writer import Report, write_report
@@ -151,6 +151,8 @@ def _design_changes(folder: Path, allow_dir: Path | None, changes: DesignOptions
     for load in changes.loads:  # before long work
         at_load(gearbox, load)
     project.prepare()
+    if not stored:  # the page leads with a response
+        project.steady(settings_of_study(gearbox))
     number = changes.resonance or 1
     study = project.design_changes(
         lambda done, total, words: note(f"Design change {done + 1} of {total}: {words}"),
