@@ -358,16 +358,21 @@ def _check_shoulders(assembly: Assembly, q: Floats) -> None:
         if not own or support.catalogue is None:
             continue
         rows = catalogue_rows(support.catalogue)
-        sense = math.copysign(1.0, rows[0].contact_angle)
+        if not holds_one_way(rows):
+            continue
+        axial = float(load[2])
         least = LEAST_SHOULDER * float(np.linalg.norm(load[:3]))
-        if holds_one_way(rows) and sense * float(load[2]) < least:
-            what = f"a load of {1e-3 * abs(float(load[2])):.4g} kN towards {'z+-'[int(-sense)]}z"
-            if abs(float(load[2])) < least:
-                what = "a radial load without the axial load that its contact angle requires"
-            raise BalanceError(
-                f"static equilibrium not found: bearings.{support.name} holds its body against loads towards "
-                f"{'z+-'[int(sense)]}z only, and has {what}"
-            )
+        towards = math.copysign(1.0, rows[0].contact_angle)
+        if towards * axial >= least:
+            continue
+        sense = {1.0: "+z", -1.0: "-z"}
+        what = f"a load of {1e-3 * abs(axial):.4g} kN towards {sense[-towards]}"
+        if abs(axial) < least:
+            what = "a radial load without the axial load that its contact angle requires"
+        raise BalanceError(
+            f"static equilibrium not found: bearings.{support.name} holds its body against loads towards "
+            f"{sense[towards]} only, and has {what}"
+        )
 
 
 def rolled_coordinates(assembly: Assembly, body: str, angle: float) -> Floats:

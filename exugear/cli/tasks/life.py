@@ -9,8 +9,8 @@ from typing import Any
 from exugear.cli.console import FailedError, make_results_folder, note, print_json, say
 from exugear.cli.tables import Column, print_table
 from exugear.cli.watched import WatchedProject
-from exugear.life.life_file import draw_life, summary
-from fe_ste.tools.display import life_text
+from exugear.life.life_file import INFINITE, draw_life, summary
+from fe_ste.tools.display import life_text, without_round_off
 
 SHOWN_LIMITS = 8
 _column = partial(Column, missing="")
@@ -102,10 +102,10 @@ def print_life(found: Mapping[str, Any], years: float) -> None:
         for bearing, remarks in found["remarks"].items():
             for remark in remarks:
                 note(f"{bearing}: {remark}", style="yellow")
-    worst = [limit for limit in found["limits"] if limit["damage"] != 0.0][:SHOWN_LIMITS]
+    worst = [limit for limit in found["limits"] if limit["damage"] == INFINITE or without_round_off(limit["damage"])]
     if worst:
         title = f"Parts with the largest fatigue damage in {years:g} years"
-        print_table(title, worst, LIMITS, "Damage: 1 is failure at the design probability.")
+        print_table(title, worst[:SHOWN_LIMITS], LIMITS, "Damage: 1 is failure at the design probability.")
     for key, style in (("assumptions", ""), ("unrated", "yellow"), ("reliefs", "yellow")):
         for line in found[key]:
             note(line, style=style)
