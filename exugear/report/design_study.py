@@ -30,7 +30,7 @@ from exugear.report.findings.design_changes import (
     settings_of_study,
     write_design_study,
 )
-from exugear.report.findings.margins import Margin, margins_in_words, margins_of, shortfalls_of
+from exugear.report.findings.margins import TIP_EDGE, Margin, margins_in_words, margins_of, shortfalls_of
 from exugear.report.findings.proposals import ASSUMPTION, DesignChange, propose_changes
 from exugear.report.findings.ranking import Resonance, ranking_of
 from exugear.report.findings.words import QUANTITIES
@@ -166,6 +166,9 @@ def study_design_changes(
             if not objection and rated is not None and change.group != ASSUMPTION:
                 margins, failed = _margins(_project_with(project, gearbox, change.name)) or ({}, [NOT_RATED])
                 costs.append(margins_in_words(rated[0], margins))
+                edge = margins.get(TIP_EDGE)
+                if edge is not None and edge.fails and not rated[0][TIP_EDGE].fails:
+                    failed = [*failed, f"{edge.part}: {edge.value:.2g} % of the load on tip edges"]
                 objection = f"fails a requirement: {failed[0]}" if failed else ""
             results.append(ChangeResult(change, effects, "; ".join(filter(None, costs)), objection))
         except _REFUSALS as error:

@@ -1,4 +1,4 @@
-"""Margins of a rating: smallest safety factors and shortest bearing life, each next to its requirement."""
+"""Margins of a rating: safety factors, bearing life and load on tip edges, each next to its requirement."""
 
 from __future__ import annotations
 
@@ -10,23 +10,34 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from exugear.gearbox.sections.loads import RatingSection
+from exugear.life.life import LEAST_OUTSIDE
 
 if TYPE_CHECKING:
     import xarray as xr
 
+TIP_EDGE = "load on tip edges"
+"""Name of the largest fraction of load outside the path of contact."""
 SAME = 0.005
 """Relative change of a margin up to which it counts as unchanged."""
 
 
 @dataclass(frozen=True)
 class Margin:
-    """Smallest value of a rating over all parts."""
+    """Least favourable value of a rating over all parts."""
 
     value: float
     required: float
+    """Smallest permitted value, or the largest one."""
     part: str
     """Part that has it."""
     unit: str = ""
+    is_largest: bool = False
+    """Whether `required` is the largest permitted value."""
+
+    @property
+    def fails(self) -> bool:
+        """Whether the requirement is not met."""
+        return self.value > self.required if self.is_largest else self.value < self.required
 
 
 def margins_of(data: xr.Dataset, rating: RatingSection) -> dict[str, Margin]:
@@ -46,6 +57,10 @@ def margins_of(data: xr.Dataset, rating: RatingSection) -> dict[str, Margin]:
         ),
         "S_0": _smallest(data, "bearing", ("static_safety",), rating.minimum_S_0),
     }
+    outside = 100.0 * data["flank_outside"].to_numpy()
+    if np.isfinite(outside).any():
+        part = str(data["flank"].to_numpy()[int(np.nanargmax(outside))])
+        found[TIP_EDGE] = Margin(float(np.nanmax(outside)), 100.0 * LEAST_OUTSIDE, part, "%", is_largest=True)
     return {name: margin for name, margin in found.items() if margin is not None}
 
 
@@ -73,9 +88,10 @@ def margins_in_words(before: Mapping[str, Margin], after: Mapping[str, Margin]) 
     changes = []
     for name, margin in after.items():
         old = before.get(name)
-        if old is None or old.value == margin.value or abs(margin.value / old.value - 1.0) <= SAME:
+        if old is None or abs(margin.value - old.value) <= SAME * abs(old.value) or old.value == margin.value:
             continue
         unit = f" {margin.unit}" if margin.unit else ""
-        form = ",.0f" if margin.unit else ".3g"
-        changes.append(f"{name} {old.value:{form}} to {margin.value:{form}}{unit} ({margin.required:{form}} required)")
+        form = ",.0f" if margin.unit == "h" else ".3g"
+        kind = "at most" if margin.is_largest else "required"
+        changes.append(f"{name} {old.value:{form}} to {margin.value:{form}}{unit} ({margin.required:{form}} {kind})")
     return "; ".join(changes)

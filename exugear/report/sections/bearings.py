@@ -17,6 +17,7 @@ from exugear.report.findings.words import figure_text
 from exugear.report.sections.material import Part, ReportData, model_name
 from exugear.report.web.html import Cell, Table, render
 from exugear.steady.peaks import line_name
+from exugear.steady.steady_file import complex_amplitudes, response_quantities
 from exugear.system.bearings.duty import BearingLoadState
 from exugear.system.bearings.rolling.rows import BearingError
 from exugear.system.operating_points import bearing_duties, mesh_duties
@@ -131,39 +132,43 @@ def _without_noise(value: float, mean: float) -> float:
 
 
 def _accelerations(material: ReportData, data: xr.Dataset) -> dict[str, Any] | None:
-    """Tabulate the largest seat accelerations of a steady-state response over all orders and speeds."""
-    signals = [str(name) for name in data["signal"].to_numpy()]
-    places = [place for place, name in enumerate(signals) if name.startswith("seat_acceleration ")]
-    if not places:
-        return None
-    amplitude = data["amplitude"].to_numpy()[:, 1:, places].astype(np.float64)
-    order = np.argsort(-amplitude.max(axis=(0, 1)))[:SEATS]
+    """Tabulate the largest accelerations at bearings and mounts of a steady-state response over orders and speeds."""
+    kinds = {"acceleration": "bearing", "mount_acceleration": "mount"}
+    amplitude = complex_amplitudes(data)[:, 1:]
+    orders = data["order"].to_numpy()[1:]
     bases = tuple(str(name) for name in data["base"].to_numpy())
+    found = []
+    for quantity in response_quantities(data):
+        if quantity.name not in kinds:
+            continue
+        sizes = quantity.sizes(amplitude)
+        for number, place in enumerate(quantity.places):
+            point, line = np.unravel_index(int(np.argmax(sizes[..., number])), sizes.shape[:2])
+            found.append((float(sizes[point, line, number]), kinds[quantity.name], place, int(point), int(line)))
+    if not found:
+        return None
+    found.sort(key=lambda own: -own[0])
     rows = []
-    for seat in order:
-        if not amplitude[..., seat].max() > MIN_RELATIVE_ACCELERATION * amplitude.max():
+    for largest, kind, place, point, line in found[:SEATS]:
+        if not largest > MIN_RELATIVE_ACCELERATION * found[0][0]:
             break
-        point, line = np.unravel_index(int(np.argmax(amplitude[..., seat])), amplitude.shape[:2])
         speed = abs(float(data["speed"][point]))
-        _, name, *axes = signals[places[seat]].split(" ")  # such as `seat_acceleration hss_a x`
-        index = tuple(int(n) for n in data["index"][int(line) + 1].to_numpy())
+        index = tuple(int(n) for n in data["index"].to_numpy()[line + 1])
         rows.append(
             {
-                "seat": " ".join([material.words.of(name), *axes]),
-                "acceleration / (m/s²)": Cell(
-                    figure_text(float(amplitude[point, line, seat])), float(amplitude[point, line, seat])
-                ),
+                "at": f"{kind}: {material.words.of(place)}",
+                "acceleration / (m/s²)": Cell(figure_text(largest), largest),
                 "order": material.words.labelled(line_name(index, bases)),
                 "speed / rpm": Cell(figure_text(speed / RPM, 4), speed / RPM),
-                "frequency / Hz": Cell(f"{float(data['order'][line + 1]) * speed / (2.0 * np.pi):.0f}"),
+                "frequency / Hz": Cell(f"{orders[line] * speed / (2.0 * np.pi):.0f}"),
             }
         )
     title = (
-        f"Accelerations at bearings: steady-state response of {model_label(choice_of(data.attrs))}, "
+        f"Accelerations at bearings and mounts: steady-state response of {model_label(choice_of(data.attrs))}, "
         f"{METHOD_LABELS[str(data.attrs['method'])]}"
     )
     name = f"seats-{model_name(choice_of(data.attrs))}-{data.attrs['method']}"
-    return {"title": title, "table": Table(rows, ("order",), caption=title, name=name, sortable=True)}
+    return {"title": title, "table": Table(rows, ("at", "order"), caption=title, name=name, sortable=True)}
 
 
 def _duties(material: ReportData, assembly: Assembly) -> dict[str, Any] | None:

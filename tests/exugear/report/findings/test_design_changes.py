@@ -224,8 +224,9 @@ def test_a_change_that_raises_another_quantity_or_lowers_nothing_is_not_recommen
 
 
 def test_margins_are_the_smallest_of_all_parts_next_to_their_requirements() -> None:
-    def life(contact: float, hours: float) -> xr.Dataset:
+    def life(contact: float, hours: float, outside: float) -> xr.Dataset:
         values = {"contact_safety": [contact, 1.9], "contact_static": [2.5, math.nan], "root_safety": [1.45, 1.5]}
+        values["outside"] = [outside, 0.0]
         flanks = {f"flank_{name}": ("flank", value) for name, value in (values | {"root_static": [3.0, 3.0]}).items()}
         lives = {f"bearing_{name}_hours": ("bearing", [hours, 9e4]) for name in ("basic", "reference")}
         lives |= {"bearing_modified_hours": ("bearing", [math.nan, math.inf]), "hours": ("bin", [3000.0, 5000.0])}
@@ -235,14 +236,17 @@ def test_margins_are_the_smallest_of_all_parts_next_to_their_requirements() -> N
         return xr.Dataset(flanks | lives, names, attributes)
 
     rating = Gearbox.from_dict(tomllib.loads(template("parallel"))).case.rating
-    before, after = (margins_of(life(*values), rating) for values in ((0.971, 12000.0), (0.891, 7000.0)))
+    before, after = (margins_of(life(*values), rating) for values in ((0.971, 12000.0, 0.005), (0.891, 7000.0, 0.02)))
     assert (before["S_H"].value, before["S_H"].part) == (0.971, "pinion left")
     assert (after["shortest bearing life"].value, after["shortest bearing life"].required) == (7000.0, 8000.0)
     required = rating.minimum_S_H
     assert margins_in_words(before, after) == (
         f"S_H 0.971 to 0.891 ({required:g} required); shortest bearing life 12,000 to 7,000 h (8,000 required)"
+        "; load on tip edges 0.5 to 2 % (1 at most)"
     )
-    assert shortfalls_of(life(0.891, 7000.0)) == ["a: L10 = 7,000 h, required 8,000 h"]
+    assert [name for name, margin in before.items() if margin.fails] == ["S_H"] * (required > 0.971)
+    assert after["load on tip edges"].fails and not before["load on tip edges"].fails
+    assert shortfalls_of(life(0.891, 7000.0, 0.02)) == ["a: L10 = 7,000 h, required 8,000 h"]
 
 
 @pytest.mark.parametrize("load", ["half", "0%", "-50%", "1000%", "nan%", "50"])
