@@ -143,8 +143,8 @@ def _accelerations(material: ReportData, data: xr.Dataset) -> dict[str, Any] | N
             continue
         sizes = quantity.sizes(amplitude)
         for number, place in enumerate(quantity.places):
-            point, line = np.unravel_index(int(np.argmax(sizes[..., number])), sizes.shape[:2])
-            found.append((float(sizes[point, line, number]), kinds[quantity.name], place, int(point), int(line)))
+            at, of = map(int, np.unravel_index(int(np.argmax(sizes[..., number])), sizes.shape[:2]))
+            found.append((float(sizes[at, of, number]), kinds[quantity.name], place, at, of))
     if not found:
         return None
     found.sort(key=lambda own: -own[0])
