@@ -323,6 +323,14 @@ def print_ranking(title: str, summary: Mapping[str, Any]) -> None:
         legend += f"; force: largest dynamic bearing force; accel.: {owner} at the bearing"
         legend += "; mounts: acceleration at mounts" if "mount_acceleration" in quantities else ""
     print_table(title, resonances, columns, f"{legend}.")
+    for quantity in quantities[1:]:
+        leader = next((own for own in summary["resonances"] if own[f"{quantity}_place"] == 1), None)
+        if leader is not None:
+            label = QUANTITIES[quantity]
+            value = significant(label.factor * leader[f"{quantity}_{UNIT_KEYS[quantity]}"], 3, 6)
+            at = f" ({leader[f'{quantity}_at']})" if f"{quantity}_at" in leader else ""
+            where = f"{significant(leader['frequency_Hz'], 4, 2)} Hz at {significant(leader['speed_rpm'], 4, 2)} rpm"
+            say(f"Highest {label.column}: ±{value} {label.unit}{at}, {where}, {leader['line']}")
 
 
 ORDER = Column("order", "line")
