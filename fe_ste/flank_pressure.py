@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fe_ste.geometry.gears import GearPair
-from fe_ste.root_stress import PATH_MARGIN, hertz_stress
+from fe_ste.root_stress import hertz_stress
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.drawing import axes_or_new
-from fe_ste.transmission_error.contact_stress import face_load_factor, load_along_face
+from fe_ste.transmission_error.contact_stress import PATH_MARGIN, face_load_factor, load_along_face
 from fe_ste.transmission_error.mean_contact import states_of_contact
 from fe_ste.transmission_error.table import TableInput
 
@@ -36,7 +36,8 @@ class FlankPressure(ReprMixin):
     """Rad; positive where it opens the gap at the +z end."""
     path: Floats
     """(p,) place on the path of contact from gear 1's base point, m; it rises towards the tip of gear 1. Both ends of
-    the path, where tip edges touch, are left out as in the rating (`fe_ste.root_stress.PATH_MARGIN`)."""
+    the path, where tip edges touch, are left out as in the rating (`PATH_MARGIN` of
+    `fe_ste.transmission_error.contact_stress`)."""
     axial: Floats
     """(k,) position along the face from its middle, m."""
     pressure: Floats

@@ -28,6 +28,7 @@ from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.tools.arrays import Booleans, Floats, Integers, SparseMatrix
 from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.threads import one_dense_thread
+from fe_ste.transmission_error.contact_stress import PATH_MARGIN
 
 # Strain gauges on the root of a tooth: surface strains as linear read-outs of a sector's displacements
 
@@ -237,8 +238,6 @@ def _stress(gear: Gear, strain: Floats) -> Floats:
 
 # Stress of a pair over its mesh cycle from the line loads of a table: Hertz at the flanks, bending at the roots
 
-PATH_MARGIN = 0.05
-"""Part of the path of contact at either end that counts as its edge."""
 CLEAR_OF_FILLET = 0.5
 """Modules along the flank from its end above the fillet within which a load acts no nearer to the gauges."""
 PITCH_ZONE = 0.05

@@ -34,7 +34,7 @@ from exugear.report.findings.margins import TIP_EDGE, Margin, margins_in_words, 
 from exugear.report.findings.proposals import ASSUMPTION, DesignChange, propose_changes
 from exugear.report.findings.ranking import Resonance, ranking_of
 from exugear.report.findings.words import QUANTITIES
-from exugear.results.folder import DESIGN_CHANGES_FILE
+from exugear.results.folder import DESIGN_CHANGES_FILE, bodies_folder
 from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.settings import SteadySettings
 from exugear.system.bearings.rolling.rows import BearingError
@@ -256,15 +256,16 @@ def _at_load(project: ComputedProject, gearbox: Gearbox, name: str, load: str) -
 
 
 def _project_with(project: ComputedProject, gearbox: Gearbox, name: str) -> ComputedProject:
-    """Give a gearbox a folder with the tables that exist: those of unchanged pairs are valid there, too."""
+    """Give a gearbox a folder with the tables and reduced bodies that exist: of unchanged parts they are valid, too."""
     folder = project.folder / FOLDER / name
     changed = project.replaced(gearbox, folder)
     changed.keep_case()
-    for path in (project.folder / "tables").glob("*.nc"):
-        if not (folder / "tables" / path.name).exists():
-            (folder / "tables").mkdir(exist_ok=True)
+    for path in (*(project.folder / "tables").glob("*.nc"), *bodies_folder(project.folder).glob("*.np*")):
+        copy = folder / path.relative_to(project.folder)
+        if not copy.exists():
+            copy.parent.mkdir(exist_ok=True)
             # A copy that was cut off would count as there.
-            write_file(folder / "tables" / path.name, path.read_bytes())
+            write_file(copy, path.read_bytes())
     return changed
 
 

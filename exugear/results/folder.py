@@ -272,7 +272,7 @@ def mesh_summary(duty: MeshLoadState) -> dict[str, Any]:
         "centre_distance_change_um": 1e6 * duty.centre_distance_change,
         "load_centroid_mm": _finite(1e3 * duty.load_centroid),
         "K_Hbeta": _finite(duty.face_load_factor),
-        "contact_pressure_MPa": _finite(1e-6 * duty.pressure),
+        "sigma_H_misaligned_MPa": _finite(1e-6 * duty.pressure),
         "remark": duty.remark,
     }
 

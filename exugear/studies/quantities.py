@@ -25,6 +25,7 @@ from exugear.studies.point_results import PointError, PointResults
 from exugear.system.modes import FREE_ROTATION, Modes
 from exugear.system.signals import SIGNALS
 from fe_ste.tools.arrays import Floats
+from fe_ste.transmission_error.contact_stress import largest_contact_stress
 
 # Output: one number of a point or several by name, with unit and options
 
@@ -356,7 +357,8 @@ def mesh_stiffness(results: PointResults, *, pair: str) -> float:
 
 def contact_pressure(results: PointResults, *, pair: str) -> float:
     """Maximum contact stress of a pair over the mesh cycle at its static load."""
-    return float(results.table(pair).static_state["max_pressure"].max())
+    table = results.table(pair)
+    return float(largest_contact_stress(results.gearbox.pairs[pair].pair, table.static_state))
 
 
 def ripples(ste: Floats) -> Floats:
@@ -398,7 +400,7 @@ def worst_pressure(
     misalignment_um: Sequence[float] = MISALIGNMENTS_UM,
     positions: int = POSITIONS,
 ) -> float:
-    """Maximum contact stress inside the flank over loads and misalignments."""
+    """Maximum pressure of a contact cell inside the flank over loads and misalignments."""
     data = results.states(pair, positions, torque_factors, misalignment_um)
     return float(data["max_pressure"].max())
 

@@ -159,15 +159,16 @@ def assumed_parameters(
     -------
     tuple of Parameter
         Housing factor where it is active, stiffness of the planets' bearings where there are bearings; axial inertia of
-        the overall output body; damping time of the meshes. Where they move the gears, tooth contact is kept at its
-        default state: 0.2 % in the GRC's frequencies from housing factor 0.2 to 1.
+        the overall output body; damping time of the meshes where damping is proportional to stiffness. Where they move
+        the gears, tooth contact is kept at its default state: 0.2 % in the GRC's frequencies from housing factor 0.2 to
+        1.
 
     Examples
     --------
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
     >>> stiffness = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
     >>> [parameter.label for parameter in assumed_parameters(gearbox, Choice("rigid"), stiffness)]
-    ['axial inertia of hss / kg m²', 'mesh damping time / µs']
+    ['axial inertia of hss / kg m²']
     """
 
     def built(changes: Mapping[str, float], contact: Mapping[str, ContactState] | None = None) -> Assembly:

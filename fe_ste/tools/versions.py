@@ -10,7 +10,7 @@ from __future__ import annotations
 TABLE = 7
 
 #: Contact about a state (`fe_ste.transmission_error.mean_contact`); it rests on `TABLE`, too.
-MEAN_CONTACT = 6
+MEAN_CONTACT = 7
 
 #: Table by the reference analysis (`fe_ste.reference.table`, and what it is computed by).
 NONLINEAR_TABLE = 3

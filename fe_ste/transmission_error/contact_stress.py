@@ -79,6 +79,38 @@ def contact_path(pair: GearPair, pmc: ArrayLike, tooth: ArrayLike, axial: ArrayL
     return pitch_point, np.clip(along, max(ends[0], min(other_ends)), min(ends[1], max(other_ends))), base_points
 
 
+_ALONG_LINE = ("pmc", "tooth", "axial_position")
+PATH_MARGIN = 0.05
+"""Part of the path of contact at either end that counts as its edge."""
+
+
+def largest_contact_stress(pair: GearPair, states: xr.Dataset) -> xr.DataArray:
+    """Return the largest Hertzian stress of the mesh cycle within the path of contact, Pa.
+
+    Both ends of the path (`PATH_MARGIN`) are left out, as in the rating: there tip edges touch, and the stress depends
+    on how close a position of the mesh cycle comes to them.
+
+    Parameters
+    ----------
+    states : of `fe_ste.transmission_error.transmission_error.static_transmission_error`, or of a table
+
+    Returns
+    -------
+    over torque, centre_distance and misalignment
+    """
+    load = states["line_load"].fillna(0.0).transpose(..., *_ALONG_LINE)
+    pmc, tooth, axial = np.meshgrid(*(load[name].to_numpy() for name in _ALONG_LINE), indexing="ij")
+    along = pair.path_pitch_point + pair.transverse_base_pitch * (pmc + tooth)
+    along += math.tan(pair.pinion.base_helix_angle) * axial
+    margin = PATH_MARGIN * (pair.path_end - pair.path_start)
+    inside = (along > pair.path_start + margin) & (along < pair.path_end - margin)
+    stress = load.copy(data=np.where(inside, contact_line_stress(pair, pmc, tooth, axial, load.to_numpy()), 0.0))
+    largest: xr.DataArray = stress.max(_ALONG_LINE)
+    return largest.assign_attrs(
+        units="Pa", long_name="largest contact stress of the mesh cycle within the path of contact"
+    )
+
+
 def mean_over_contact_line(stress: ArrayLike, load: ArrayLike) -> Floats:
     """Return the mean stress along the last axis, weighted by the load there; zero without load.
 
@@ -91,9 +123,6 @@ def mean_over_contact_line(stress: ArrayLike, load: ArrayLike) -> Floats:
     """
     total = np.sum(load, axis=-1)
     return np.asarray((np.asarray(stress) * load).sum(axis=-1) / np.where(total > 0.0, total, 1.0))
-
-
-_ALONG_LINE = ("pmc", "tooth", "axial_position")
 
 
 def mean_contact_stress(pair: GearPair, curve: xr.Dataset) -> xr.DataArray:

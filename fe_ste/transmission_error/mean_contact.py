@@ -32,7 +32,7 @@ from fe_ste.tools.stores import Arrays, Cache
 from fe_ste.tools.threads import one_dense_thread, side_by_side
 from fe_ste.tools.versions import MEAN_CONTACT
 from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
-from fe_ste.transmission_error.contact_stress import face_load_factor, load_along_face
+from fe_ste.transmission_error.contact_stress import face_load_factor, largest_contact_stress, load_along_face
 from fe_ste.transmission_error.states import StateAxes
 from fe_ste.transmission_error.table import TableInput
 from fe_ste.transmission_error.transmission_error import solve_positions
@@ -88,9 +88,10 @@ class MeanContact(ReprMixin):
     """Slope of the deflection by the centre distance under constant force, between both misalignments."""
     face_load_factor: Floats
     """(2,) K_Hbeta: maximum divided by mean line load along the face width."""
-    max_pressure: Floats
+    contact_stress: Floats
+    """(2,) largest of the cycle within the path of contact, Pa."""
     edge_pressure: Floats
-    """(2,) largest of the cycle, away from and at tip edges, Pa."""
+    """(2,) largest of the cycle at tip edges, Pa."""
     axial: Floats
     """(k,) middle of the contact slices, m."""
     line_load: Floats
@@ -216,7 +217,7 @@ def mean_contact(wanted: TableInput) -> MeanContact:
         tangent_load_centroid=mean["tangent_load_centroid"].to_numpy(),
         deflection_by_distance=(float(other["ste"].mean()) - float(mean["ste"].mean())) / change,
         face_load_factor=face_load_factor(data).to_numpy(),
-        max_pressure=largest["max_pressure"].to_numpy(),
+        contact_stress=largest_contact_stress(pair, finer).to_numpy(),
         edge_pressure=largest["edge_pressure"].to_numpy(),
         axial=data["axial_position"].to_numpy(),
         line_load=load_along_face(data).to_numpy(),

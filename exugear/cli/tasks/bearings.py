@@ -27,8 +27,7 @@ MESH_LEGEND = (
     "gap opens at the other end. Load centroid: along +z from the middle of the face width. K_Hbeta: face load factor."
 )
 MESH_PRESSURE = (
-    " Contact stress: maximum of ten positions of the mesh cycle, without tip-edge contact and load factors, with the "
-    "gears displaced by the static load."
+    " σ_H misaligned: largest of the mesh cycle within the path of contact, at this misalignment, no load factors."
 )
 
 
@@ -98,7 +97,7 @@ MESHES = (
     Column("gap at +z\nend µm", "opening_um", ".1f"),
     Column("load cen-\ntroid mm", "load_centroid_mm", ".1f"),
     Column("K_Hbeta", "K_Hbeta", ".2f"),
-    Column("contact\nstress MPa", "contact_pressure_MPa", ".0f"),
+    Column("σ_H mis-\naligned MPa", "sigma_H_misaligned_MPa", ".0f"),
 )
 
 
@@ -114,6 +113,6 @@ def print_bearings(summary: Mapping[str, Any]) -> None:
     print_table("Element load, ratings and rating life of the bearings", rows, LIVES, legend)
     if summary["meshes"]:
         legend = MESH_LEGEND
-        if any(mesh["contact_pressure_MPa"] is not None for mesh in summary["meshes"]):
+        if any(mesh["sigma_H_misaligned_MPa"] is not None for mesh in summary["meshes"]):
             legend += MESH_PRESSURE
         print_table("Meshes under the static load", summary["meshes"], MESHES, legend)

@@ -160,7 +160,7 @@ def _pair_summary(gearbox: Gearbox, name: str) -> dict[str, Any]:
         "transverse_contact_ratio": pair.transverse_contact_ratio,
         "overlap_ratio": pair.overlap_ratio,
         "torque_gear_1_N_m": spec.static_torque,
-        "pitch_point_pressure_MPa": 1e-6 * margins.pitch_point_pressure,
+        "sigma_H0_MPa": 1e-6 * margins.nominal_contact_stress,
         "margin_to_form_diameter": [None if math.isnan(margin) else margin for margin in margins.form],
         "tip_thickness_in_modules": list(margins.tip_thickness),
         "held_diameter_mm": [1e3 * gear.held_diameter for gear in (pair.pinion, pair.gear)],
@@ -273,8 +273,8 @@ def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
 
 PAIR_LEGEND = "Gear 1 is the first gear of the pair; torque: static torque of the gearbox file."
 MARGIN_LEGEND = (
-    "Contact stress: Hertz, at the pitch point under the static torque of gear 1, even load distribution, no load "
-    "factors. SAP: start of active profile; its distance from the root form diameter in % of the profile length "
+    "σ_H0: nominal contact stress at the pitch point under the static torque, without load factors (ISO 6336-2). "
+    "SAP: start of active profile; its distance from the root form diameter in % of the profile length "
     "(roll length). Backlash: circumferential, on the working circle. Held at: held_diameter_mm, at which the tables "
     "fix the gear body; a smaller one of an external gear lowers the mesh stiffness."
 )
@@ -322,7 +322,7 @@ def _joined(form: str, factor: float = 1.0) -> Callable[[Iterable[float]], str]:
 
 MARGINS = (
     Column("pair", "pair"),
-    Column("contact stress\nat pitch MPa", "pitch_point_pressure_MPa", ".0f"),
+    Column("σ_H0\nMPa", "sigma_H0_MPa", ".0f"),
     Column("SAP above root\nform dia. %", "margin_to_form_diameter", _percent),
     Column("backlash\nµm", "backlash_um", _backlash),
     Column("tip thickness\ns_an/m_n", "tip_thickness_in_modules", _joined(".2f")),

@@ -15,12 +15,13 @@ from fe_ste.tools.display import life_text, without_round_off
 SHOWN_LIMITS = 8
 _column = partial(Column, missing="")
 CONTACT_LEGEND = (
-    "sigma_H: Hertzian stress from the line loads of the finite element contact within the path of contact, with K_v, "
-    "gears displaced by each load; nominal: sigma_H0 of ISO 6336-2 at the largest load, without load factors. Outside: "
-    "load carried outside the path of contact. S_H ISO: safety factor of ISO 6336-2; stat.: under the largest load."
+    "σ_H life: largest over loads and mesh cycle within the path of contact, misaligned by each load, with K_v "
+    "(finite elements); σ_H0: nominal, at the pitch point, at the largest load (ISO 6336-2). Outside: load carried "
+    "outside the path of contact. K_Hbeta: of finite elements, at the largest load; S_H ISO has it, too: σ_H0 with "
+    "load factors (ISO 6336-2). S_H stat.: under the largest load."
 )
 ROOT_LEGEND = (
-    "sigma_F: maximum root stress (finite elements); nominal: sigma_F0 of ISO 6336-3 at the largest load, without load "
+    "σ_F: maximum root stress (finite elements); nominal: σ_F0 of ISO 6336-3 at the largest load, without load "
     "factors; minimum: smallest principal stress (compression). S_F ISO: safety factor of ISO 6336-3; stat.: under the "
     "largest load."
 )
@@ -56,8 +57,8 @@ def _flank(kind: str) -> Column:
 
 FLANKS = (
     _flank("contact"),
-    _column("sigma_H\nMPa", "contact_stress", ".0f", 1e-6),
-    _column("nominal\nMPa", "nominal_contact", ".0f", 1e-6),
+    _column("σ_H\nlife MPa", "contact_stress", ".0f", 1e-6),
+    _column("σ_H0\nMPa", "nominal_contact", ".0f", 1e-6),
     _column("outside\n%", "outside", ".1f", 100.0),
     _column("K_Hbeta", "face_load", ".3f"),
     _column("fatigue\ndamage", "contact_damage", ".3g"),
@@ -67,7 +68,7 @@ FLANKS = (
 )
 ROOTS = (
     _flank("root"),
-    _column("sigma_F\nMPa", "root_stress", ".0f", 1e-6),
+    _column("σ_F\nMPa", "root_stress", ".0f", 1e-6),
     _column("nominal\nMPa", "nominal_root", ".0f", 1e-6),
     _column("minimum\nMPa", "compression", ".0f", 1e-6),
     _column("fatigue\ndamage", "root_damage", ".3g"),

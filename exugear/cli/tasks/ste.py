@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from rich.progress import Progress, TaskID
 
@@ -18,6 +20,7 @@ from exugear.cli.console import (
     print_json,
     progress_bar,
     say,
+    warn,
 )
 from exugear.cli.tables import Column, print_table
 from exugear.cli.watched import WatchedProject, errors_of_tables
@@ -44,6 +47,7 @@ from fe_ste.reference.newton import Iteration
 from fe_ste.reference.table import NonlinearTable
 from fe_ste.tools.drawing import RenderingError
 from fe_ste.tools.threads import Workers, available_cores
+from fe_ste.transmission_error.cycle import HARMONICS
 from fe_ste.transmission_error.table import MeshTable
 
 #: Minimum number of positions, with which the mesh cycle resolves the harmonics needed by the dynamics.
@@ -72,10 +76,33 @@ def ste(gearbox: Gearbox, out: Path | None, names: list[str], positions: int | N
     if as_json:
         print_json({"case": gearbox.source, "tables": summaries, "pictures": [str(path) for path in pictures]})
     else:
-        print_table("Static transmission error", summaries, TABLES, TABLE_LEGEND)
+        print_table("Static transmission error", summaries, ERRORS, ERROR_LEGEND)
+        print_table("Stiffness and contact of aligned gears", summaries, CONTACTS, CONTACT_LEGEND)
         say(f"Results: {folder / 'tables'}; pictures: {folder / 'pictures'}")
+    for line in few_positions(summaries):
+        warn(line)
     if doubts := errors_of_tables(tables):
         raise FailedError("\n".join(["invalid tables:", *doubts]))
+
+
+def few_positions(summaries: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Say where more positions of the mesh cycle are needed.
+
+    Examples
+    --------
+    >>> table = {"pair": "stage_1", "positions": 12, "ste_peak_to_peak_um": 0.137, "ste_peak_to_peak_error_um": 0.05}
+    >>> print(*few_positions([table]))
+    stage_1: 12 positions of the mesh cycle; the peak-to-peak transmission error may be off by 36 %, ...
+    """
+    for one in summaries:
+        size = one["ste_peak_to_peak_um"]
+        error = one["ste_peak_to_peak_error_um"]
+        if size and error and error > LARGEST_ERROR * size:
+            yield (
+                f"{one['pair']}: {one['positions']} positions of the mesh cycle; the peak-to-peak transmission error "
+                f"may be off by {100.0 * error / size:.0f} %, and the largest contact stress may be too low: use "
+                f"--positions {2 * one['positions']}"
+            )
 
 
 def _print_misalignment(project: WatchedProject) -> None:
@@ -199,12 +226,17 @@ def _draw_contacts(requests: list[TableRequest], tables: dict[str, MeshTable], f
     return pictures
 
 
-TABLE_LEGEND = (
-    "Torque: of gear 1. TE: transmission error, mean and peak-to-peak (p-p) over the mesh cycle. Stiffness: mean mesh "
-    "stiffness. Stress: maximum contact stress of the mesh cycle without tip-edge contact; at the pitch point: Hertz, "
-    "even load distribution. Aligned gears, no load factors. States conv.: converged of all states of the table. Gears "
-    "are held at held_diameter_mm: what lies between it and the teeth is part of the stiffness."
+ERROR_LEGEND = (
+    "Torque: of gear 1. TE: transmission error, mean and peak-to-peak (p-p) over the mesh cycle; p-p error: estimated "
+    "from every second position. 1. to 4.: harmonics, zero-to-peak."
 )
+CONTACT_LEGEND = (
+    "Stiffness: mean mesh stiffness, with what lies between held_diameter_mm and the teeth. σ_H0: nominal, at the pitch "
+    "point (ISO 6336-2). K_Hbeta, σ_H aligned: of finite elements, parallel axes, largest of the mesh cycle within the "
+    "path of contact, no load factors. Converged: of all states of the table."
+)
+LARGEST_ERROR = 0.1
+"""Estimated error of the peak-to-peak transmission error, over its value, from which more positions are advised."""
 REFERENCE_LEGEND = (
     "Torque: of gear 1. TE: transmission error, mean and peak-to-peak (p-p), by the nonlinear reference analysis; "
     "table: by the method of the tables, which the dynamic models use. σ_H: contact stress of the most loaded tooth "
@@ -213,13 +245,26 @@ REFERENCE_LEGEND = (
 
 
 PAIR = (Column("pair", "pair"), Column("torque\nN m", "torque_gear_1_N_m", ".1f"))
-TABLES = (
+
+
+def _harmonic(number: int, table: Mapping[str, Any]) -> str:
+    value = table["ste_harmonics_um"][number]
+    return "-" if value is None else f"{value:.3f}"
+
+
+ERRORS = (
     *PAIR,
     Column("TE mean\nµm", "ste_mean_um", ".2f"),
     Column("TE p-p\nµm", "ste_peak_to_peak_um", ".3f"),
+    Column("p-p err.\nµm", "ste_peak_to_peak_error_um", ".3f"),
+    *(Column(f"{n + 1}.\nµm", partial(_harmonic, n)) for n in range(HARMONICS)),
+)
+CONTACTS = (
+    *PAIR,
     Column("stiffn.\nMN/m", "mesh_stiffness_mean_N_per_m", ".4g", 1e-6),
-    Column("stress\nMPa", "max_pressure_MPa", ".0f"),
-    Column("at pitch\npoint MPa", "pitch_point_pressure_MPa", ".0f"),
+    Column("σ_H0\nMPa", "sigma_H0_MPa", ".0f"),
+    Column("K_Hbeta\naligned", "K_Hbeta_aligned", ".2f"),
+    Column("σ_H\naligned MPa", "sigma_H_aligned_MPa", ".0f"),
     Column("states\nconv.", lambda table: f"{table['states'] - table['not_converged']}/{table['states']}"),
 )
 REFERENCES = (
@@ -231,6 +276,6 @@ REFERENCES = (
     Column("table\np-p µm", "superelement_peak_to_peak_um", ".3f"),
     Column("σ_H\nMPa", "contact_stress_MPa", ".0f"),
     Column("table\nσ_H MPa", "superelement_contact_stress_MPa", ".0f"),
-    Column("posit.\nconv.", TABLES[-1].key),
+    Column("posit.\nconv.", CONTACTS[-1].key),
 )
 """Mean and peak-to-peak values by the reference analysis and by the method of the tables."""

@@ -33,6 +33,8 @@ from exugear.system.tooth_mesh.placement import MeshError
 from exugear.system.tooth_mesh.tables import fitting_table
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.files import FileError
+from fe_ste.transmission_error.contact_stress import face_load_factor, largest_contact_stress
+from fe_ste.transmission_error.cycle import harmonics_of
 from fe_ste.transmission_error.surface import SteSurface
 from fe_ste.transmission_error.table import MeshTable, TableError
 
@@ -294,28 +296,11 @@ class PairExcitation:
     """(n,) mesh stiffness, N/m."""
     harmonics: Floats
     """(HARMONICS,) amplitudes of the transmission error at multiples of the mesh frequency, m."""
-    pressure: float
-    """Highest contact pressure over the cycle, Pa; NaN if the table has none."""
+    face_load_factor: float
+    contact_stress: float
+    """K_Hbeta, and largest contact stress of the mesh cycle within the path of contact, Pa: aligned gears."""
     iso_stiffness: float
     """Mesh stiffness to ISO 6336-1 method B, N/m."""
-
-
-def harmonics_of(error: Floats, count: int = HARMONICS) -> Floats:
-    """Return the amplitudes of the harmonics of a curve that is evenly sampled over one cycle.
-
-    Examples
-    --------
-    >>> angle = 2.0 * np.pi * np.arange(16) / 16
-    >>> harmonics_of(1.0 + 3.0 * np.cos(angle) - 0.5 * np.sin(2.0 * angle), 3).round(9).tolist()
-    [3.0, 0.5, 0.0]
-    """
-    amplitudes = 2.0 * np.abs(np.fft.rfft(error)) / error.size
-    if error.size % 2 == 0:
-        amplitudes[-1] *= 0.5
-    harmonics = np.zeros(count)
-    known = amplitudes[1 : count + 1]
-    harmonics[: known.size] = known
-    return harmonics
 
 
 def excitations(context: Context, results: StoredResults) -> tuple[PairExcitation, ...]:
@@ -331,8 +316,9 @@ def excitations(context: Context, results: StoredResults) -> tuple[PairExcitatio
                 position=np.asarray(state["pmc"].to_numpy(), dtype=np.float64),
                 error=error,
                 stiffness=np.asarray(state["mesh_stiffness"].to_numpy(), dtype=np.float64),
-                harmonics=harmonics_of(error),
-                pressure=float(state["max_pressure"].max()) if "max_pressure" in state else float("nan"),
+                harmonics=harmonics_of(error, HARMONICS),
+                face_load_factor=float(face_load_factor(state)),
+                contact_stress=float(largest_contact_stress(context.gearbox.pairs[name].pair, state)),
                 iso_stiffness=iso6336_stiffness(context.gearbox.pairs[name]),
             )
         )

@@ -256,8 +256,8 @@ def resonances(data: xr.Dataset, quantity: str | None = None) -> pd.DataFrame:
     >>> settings = SteadySettings(SpeedRange.from_text("15:25:11"))
     >>> table = resonances(steady_response(gearbox, Choice("rigid"), stiffness, settings=settings))
     >>> table[["line", "error_place"]].head(1)
-                  line  error_place
-    0  2 x intermediate            1
+             line  error_place
+    0  high_speed            1
     """
     import pandas as pd
 

@@ -210,7 +210,7 @@ def _mesh_row(material: ReportData, duty: MeshLoadState) -> dict[str, object]:
         "gap at +z end / µm": f"{1e6 * duty.opening:.1f}",
         "load centroid / mm": shown(1e3 * duty.load_centroid, ".1f"),
         "K_Hbeta": shown(duty.face_load_factor, ".2f"),
-        "contact stress / MPa": shown(1e-6 * duty.pressure, ".0f"),
+        "σ_H misaligned / MPa": shown(1e-6 * duty.pressure, ".0f"),
     }
 
 

@@ -55,10 +55,9 @@ def _row(material: ReportData, own: PairContact) -> dict[str, object]:
         "transverse contact ratio": _cell(own.pair.transverse_contact_ratio),
         "overlap ratio": Cell(rounded_text(overlap), overlap, tag="mind" if off > OFF_WHOLE else ""),
         "gap at +z end / µm": _cell(1e6 * own.actual.misalignment * own.pair.face_width),
-        "K_Hbeta aligned": Cell(f"{own.aligned.face_load_factor:.2f}", own.aligned.face_load_factor),
-        "K_Hbeta as held": Cell(f"{factor:.2f}", factor, tag="mind" if factor > UNEVEN else ""),
-        "pressure aligned / MPa": _cell(1e-6 * own.aligned.highest[0]),
-        "pressure as held / MPa": _cell(1e-6 * own.actual.highest[0]),
+        "load along the face": Cell(
+            "uneven" if factor > UNEVEN else "even", factor, tag="mind" if factor > UNEVEN else ""
+        ),
         "highest pressure at": place_on_flank(own, *own.actual.highest[1:], labels),
         "tip edge pressure / MPa": _cell(1e-6 * edge) if edge > 0.0 else Cell("–"),
         "highest tip edge pressure at": edge_in_words(own, labels),
@@ -82,9 +81,8 @@ def _pair(material: ReportData, own: PairContact, ripple: PairExcitation | None)
     heaviest = 1.05 * max(float(state.line_load.max()) for state in states.values())
     maps = []
     for title, state in states.items():
-        pressure = f"{rounded_text(1e-6 * state.highest[0])} MPa, K_Hbeta {state.face_load_factor:.2f}"
-        words = f"{title}: pressure over the flank, highest {pressure}; line load along the face."
-        maps.append((f"{title}: {pressure}", flank_map(state, highest, heaviest, words)))
+        words = f"{title}: pressure over the flank; line load along the face."
+        maps.append((title, flank_map(state, highest, heaviest, words)))
     pinion = material.words.of(own.pair.pinion.name)
     return {
         "title": f"{material.words.of(own.pair.name)}, flank of {pinion}",

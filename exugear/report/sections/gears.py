@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -10,6 +11,11 @@ from exugear.report.findings.context import HARMONICS, PairExcitation, excitatio
 from exugear.report.findings.words import figure_text
 from exugear.report.sections.material import Axis, Curve, Part, ReportData
 from exugear.report.web.html import Cell, Table, render
+from exugear.system.bearings.rolling.rows import BearingError
+from exugear.system.operating_points import mesh_duties
+from exugear.system.statics import BalanceError
+from exugear.system.tooth_mesh.contact_state import MeshLoadState
+from fe_ste.standards.pitting import nominal_contact_stress
 
 
 def gears_section(material: ReportData) -> Part:
@@ -27,6 +33,7 @@ def gears_section(material: ReportData) -> Part:
             [Axis("position in the mesh cycle"), Axis("transmission error / µm")],
         ),
         errors=Table([_row(material, own) for own in found], caption="Static transmission error", name="errors"),
+        stresses=Table(_stress_rows(material, found), caption="Contact stresses", name="stresses"),
         harmonics=Table([_harmonics_row(material, own) for own in found], caption="Harmonics", name="harmonics"),
         gears=Table(_gear_rows(material), caption="Gears", name="gears"),
     )
@@ -46,8 +53,61 @@ def _row(material: ReportData, excitation: PairExcitation) -> dict[str, object]:
         "peak-to-peak / µm": Cell(f"{_swing(excitation):.3f}", _swing(excitation)),
         "mean mesh stiffness / (N/µm)": f"{1e-6 * float(excitation.stiffness.mean()):.0f}",
         "ISO 6336-1 B / (N/µm)": f"{1e-6 * excitation.iso_stiffness:.0f}",
-        "contact stress / MPa": f"{1e-6 * excitation.pressure:.0f}" if math.isfinite(excitation.pressure) else "–",
     }
+
+
+def _stress_rows(material: ReportData, found: Iterable[PairExcitation]) -> list[dict[str, object]]:
+    """Contact stress of each pair, from the nominal value to that of the rating, with the K_Hbeta of each."""
+    misaligned = _misaligned(material)
+    rows = []
+    for own in found:
+        pair = material.context.gearbox.pairs[own.pair].pair
+        nominal = nominal_contact_stress(pair, own.torque / pair.pinion.reference_radius)
+        actual = misaligned.get(own.pair)
+        rated = _rated(material, own.pair)
+        rows.append(
+            {
+                "pair": material.words.of(own.pair),
+                "σ_H0 / MPa": _cell(1e-6 * nominal, ".0f"),
+                "K_Hbeta aligned": _cell(own.face_load_factor, ".2f"),
+                "σ_H aligned / MPa": _cell(1e-6 * own.contact_stress, ".0f"),
+                "K_Hbeta misaligned": _cell(actual.face_load_factor if actual else math.nan, ".2f"),
+                "σ_H misaligned / MPa": _cell(1e-6 * actual.pressure if actual else math.nan, ".0f"),
+                "K_Hbeta ISO 6336-1": _cell(rated.get("K_Hbeta", math.nan), ".2f"),
+                "σ_H ISO 6336-2 / MPa": _cell(1e-6 * rated.get("sigma_H", math.nan), ".0f"),
+            }
+        )
+    return rows
+
+
+def _cell(value: float, form: str) -> Cell:
+    return Cell(format(value, form) if math.isfinite(value) else "–", value)
+
+
+def _misaligned(material: ReportData) -> dict[str, MeshLoadState]:
+    """Return the mesh of each pair with the largest contact stress under the static load.
+
+    It is that of the headline's model, or of the first one with solved contacts where there is no headline.
+    """
+    context = material.context
+    models = context.assemblies.values() if material.headline is None else [context.assembled(material.headline.choice)]
+    assembly = next((model for model in models if model.contacts.contacts), None)
+    if assembly is None:
+        return {}
+    pairs = {element.mesh.name: element.mesh.pair.name for element in assembly.elements}
+    try:
+        states = [state for state in mesh_duties(assembly) if math.isfinite(state.pressure)]
+    except (BalanceError, BearingError):  # the section on bearings says why
+        return {}
+    return {pairs[state.name]: state for state in sorted(states, key=lambda state: state.pressure)}
+
+
+def _rated(material: ReportData, pair: str) -> Mapping[str, float]:
+    """Return the factors and stresses to ISO 6336 of the flank of a pair with the largest contact stress."""
+    sheet = material.ratings.sheet
+    families = {mesh.family for mesh in material.context.gearbox.meshes if mesh.pair.name == pair}
+    flanks = [] if sheet is None else [flank.standard for flank in sheet.flanks if flank.family in families]
+    return max(flanks, key=lambda standard: standard.get("sigma_H", 0.0), default={})
 
 
 def _harmonics_row(material: ReportData, excitation: PairExcitation) -> dict[str, object]:

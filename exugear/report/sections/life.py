@@ -77,8 +77,8 @@ def _rated_variant(material: ReportData, data: xr.Dataset) -> dict[str, Any]:
 
 def _flank_rows(data: xr.Dataset) -> list[dict[str, object]]:
     columns = {
-        "σ_H / MPa": ("contact_stress", 1e-6, ".0f"),
-        "σ_H0, ISO / MPa": ("nominal_contact", 1e-6, ".0f"),
+        "σ_H life / MPa": ("contact_stress", 1e-6, ".0f"),
+        "σ_H0 / MPa": ("nominal_contact", 1e-6, ".0f"),
         "outside the path / %": ("outside", 100.0, ".1f"),
         "K_Hbeta": ("face_load", 1.0, ".3f"),
         "pitting damage": ("contact_damage", 1.0, ".3g"),

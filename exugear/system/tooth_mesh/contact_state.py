@@ -283,7 +283,7 @@ class MeshLoadState(ReprMixin):
     face_load_factor: float = math.nan
     """K_Hbeta: highest over mean line load along the face; NaN likewise."""
     pressure: float = math.nan
-    """Largest of the mesh cycle away from tip edges, Pa; NaN likewise."""
+    """sigma_H: largest of the mesh cycle within the path of contact, Pa; NaN likewise."""
     remark: str = ""
     """Why no contact was solved; empty where it was."""
 
@@ -307,6 +307,6 @@ def with_contact(duty: MeshLoadState, place: MeshPlace | None, flank: int) -> Me
     contact = solved.contacts[duty.name]
     centre, factor, pressure = (
         float(contact.at(values, place.misalignment))
-        for values in (contact.load_centroid, contact.face_load_factor, contact.max_pressure)
+        for values in (contact.load_centroid, contact.face_load_factor, contact.contact_stress)
     )
     return replace(duty, load_centroid=flank * centre, face_load_factor=factor, pressure=pressure)

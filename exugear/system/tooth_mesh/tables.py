@@ -22,8 +22,10 @@ from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.units import UM
 from fe_ste.geometry.checks import GeometryError
 from fe_ste.geometry.gears import GearPair
+from fe_ste.standards.pitting import nominal_contact_stress
 from fe_ste.tools.arrays import Floats
-from fe_ste.transmission_error.search import pitch_point_pressure
+from fe_ste.transmission_error.contact_stress import face_load_factor, largest_contact_stress
+from fe_ste.transmission_error.cycle import HARMONICS, harmonics_of, peak_to_peak_error
 from fe_ste.transmission_error.states import CUT_OFF
 from fe_ste.transmission_error.surface import DOUBTFUL_CUT_OFF, MOST_MISSING, GapError, complete_cycle
 from fe_ste.transmission_error.table import MeshTable, TableError, TableInput
@@ -403,8 +405,9 @@ def summarise(request: TableRequest, table: MeshTable) -> dict[str, Any]:
     Results refer to the static state, except for the numbers of states. Results without a converged position are None.
     """
     data = table.static_state
+    pair = request.wanted.pair
 
-    def figure(values: xr.DataArray) -> float | None:
+    def figure(values: xr.DataArray | float) -> float | None:
         value = float(values)
         if value == value:
             return value
@@ -423,8 +426,11 @@ def summarise(request: TableRequest, table: MeshTable) -> dict[str, Any]:
         "ste_mean_um": figure(1e6 * data["ste"].mean()),
         "ste_peak_to_peak_um": figure(1e6 * (data["ste"].max() - data["ste"].min())),
         "mesh_stiffness_mean_N_per_m": figure(data["mesh_stiffness"].mean()),
-        "max_pressure_MPa": figure(1e-6 * data["max_pressure"].max()),
-        "pitch_point_pressure_MPa": 1e-6 * pitch_point_pressure(request.wanted.pair, float(data["torque"])),
+        "ste_peak_to_peak_error_um": figure(1e6 * peak_to_peak_error(data["ste"].to_numpy())),
+        "ste_harmonics_um": [figure(1e6 * value) for value in harmonics_of(data["ste"].to_numpy(), HARMONICS)],
+        "sigma_H0_MPa": 1e-6 * nominal_contact_stress(pair, float(data["torque"]) / pair.pinion.reference_radius),
+        "K_Hbeta_aligned": figure(face_load_factor(data)),
+        "sigma_H_aligned_MPa": figure(1e-6 * largest_contact_stress(pair, data)),
         "input_hash": table.input_hash,
     }
 

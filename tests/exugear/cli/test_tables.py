@@ -91,7 +91,7 @@ def test_check(printed: Printed) -> None:
             "transverse_contact_ratio": 1.543,
             "overlap_ratio": 10.691,
             "torque_gear_1_N_m": -1234567.8,
-            "pitch_point_pressure_MPa": 1234.0,
+            "sigma_H0_MPa": 1234.0,
             "margin_to_form_diameter": [0.123, None],
             "tip_thickness_in_modules": [0.57, 0.75],
             "held_diameter_mm": [120.0, 1180.0],
@@ -160,10 +160,13 @@ def test_ste(printed: Printed) -> None:
             "ste_mean_um": 123.45,
             "ste_peak_to_peak_um": 12.345,
             "mesh_stiffness_mean_N_per_m": 12345.6e6,
-            "max_pressure_MPa": 12345.0,
             "contact_stress_MPa": 12345.0,
             "superelement_contact_stress_MPa": 12345.0,
-            "pitch_point_pressure_MPa": 1234.0,
+            "sigma_H0_MPa": 1234.0,
+            "K_Hbeta_aligned": 12.34,
+            "sigma_H_aligned_MPa": 12345.0,
+            "ste_peak_to_peak_error_um": 12.345,
+            "ste_harmonics_um": [123.456] * 4,
             "superelement_mean_um": 123.45,
             "superelement_peak_to_peak_um": 12.345,
             "difference_of_means_percent": -12.3,
@@ -172,9 +175,10 @@ def test_ste(printed: Printed) -> None:
         }
         for name in NAMES
     ]
-    tables.print_table("Static transmission error", summaries, ste.TABLES, ste.TABLE_LEGEND)
+    tables.print_table("Static transmission error", summaries, ste.ERRORS, ste.ERROR_LEGEND)
+    tables.print_table("Contact", summaries, ste.CONTACTS, ste.CONTACT_LEGEND)
     tables.print_table("Reference", summaries, ste.REFERENCES, ste.REFERENCE_LEGEND)
-    printed.check(2)
+    printed.check(3)
 
 
 def test_bearings(printed: Printed) -> None:
@@ -200,7 +204,7 @@ def test_bearings(printed: Printed) -> None:
         "opening_um": -1234.5,
         "load_centroid_mm": -123.4,
         "K_Hbeta": 12.34,
-        "contact_pressure_MPa": 12345.0,
+        "sigma_H_misaligned_MPa": 12345.0,
     }
     duties = [{**duty, "bearing": name} for name in NAMES]
     meshes = [{**mesh, "mesh": name} for name in NAMES]

@@ -39,6 +39,14 @@ def between(search, grc, stiffness):
     return {kind: search.Between.of(given, {"kind": kind, **NEARLY_THE_FILE}) for kind in kinds}
 
 
+def test_the_search_has_the_damping_of_comparisons_with_published_figures(search, monkeypatch):
+    monkeypatch.setattr("sys.argv", ["search_3215.py"])
+    project = search.published_project(Choice("bushing"))
+    assert project.folder == Path("results/grc750-published")
+    assert project.gearbox.case.damping.modal_percent is None
+    assert project.gearbox.damping_times.mesh == project.gearbox.damping_times.bearing == 4e-6
+
+
 @pytest.mark.validation
 @pytest.mark.parametrize("kind", ["planet_bearings", "all_bearings"])
 def test_each_stiffness_found_makes_the_frequency_a_natural_one(search, grc, stiffness, between, kind):

@@ -41,7 +41,7 @@ from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.files import FileError
-from fe_ste.transmission_error.contact_stress import face_load_factor, load_along_face
+from fe_ste.transmission_error.contact_stress import face_load_factor, largest_contact_stress, load_along_face
 from fe_ste.transmission_error.table import MeshTable, TableError
 
 # Results in a folder that belong to a gearbox; files computed from other input are skipped and reported
@@ -346,7 +346,7 @@ def put_tables(results: Results, tables: Mapping[str, MeshTable]) -> None:
             "mesh_cycle_positions": data["pmc"],
             "transmission_error_peak_to_peak": error.max() - error.min(),
             "mean_mesh_stiffness": stiffness.mean(),
-            "contact_pressure_maximum": data["max_pressure"].max(),
+            "contact_pressure_maximum": largest_contact_stress(pair, data),
             "face_load_factor": face_load_factor(data),
             "load_along_face": along,
             "load_along_face_positions_from_middle": along["axial_position"],
