@@ -231,7 +231,7 @@ ERROR_LEGEND = (
     "from every second position. 1. to 4.: harmonics, zero-to-peak."
 )
 CONTACT_LEGEND = (
-    "Stiffness: mean mesh stiffness, with what lies between held_diameter_mm and the teeth. σ_H0: nominal, at the pitch "
+    "Stiffness: mean mesh stiffness, with what lies between held_diameter_mm and the teeth. σ_H0: nominal, at pitch "
     "point (ISO 6336-2). K_Hbeta, σ_H aligned: of finite elements, parallel axes, largest of the mesh cycle within the "
     "path of contact, no load factors. Converged: of all states of the table."
 )
