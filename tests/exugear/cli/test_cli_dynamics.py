@@ -279,9 +279,9 @@ file = "duty.csv"
     assert "load factors" in said
     places = {
         "check": "pitch point",
-        "ste": "Aligned gears",
-        "bearings": "displaced by the static load",
-        "life": "displaced by each load",
+        "ste": "parallel axes",
+        "bearings": "at this misalignment",
+        "life": "misaligned by each load",
     }
     assert places[verb] in said
 
