@@ -100,8 +100,7 @@ QuantityOption = Annotated[
     typer.Option(
         "--quantity",
         metavar="NAME",
-        help="Quantity that ranks the resonances: transmission_error, bearing_force or acceleration. (default: gearbox "
-        "file)",
+        help="Rank by transmission_error, bearing_force, acceleration. (default: file)",
         show_default=False,
     ),
 ]

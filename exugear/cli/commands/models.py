@@ -112,8 +112,7 @@ def steady(
         typer.Option(
             "--load-case",
             metavar="NAME",
-            help="Linearise at the torques of a load case; results in at-NAME of the results folder. (default: static "
-            "load)",
+            help="Linearise at the torques of a load case; results in at-NAME. (default: static load)",
             show_default=False,
         ),
     ] = None,
@@ -141,9 +140,7 @@ def steady(
     ] = None,
     branches: Annotated[
         bool,
-        typer.Option(
-            "--continuation", help="Continuation: follow the solution through turning points (method nonlinear)."
-        ),
+        typer.Option("--continuation", help="Continuation through turning points (nonlinear)."),
     ] = False,
     quantity: options.QuantityOption = None,
     out: options.OutOption = None,
@@ -153,8 +150,7 @@ def steady(
 ) -> None:
     """Compute the steady-state response and rank the resonances.
 
-    Needs no run-up. Speeds are added where mesh orders cross modes. Transmission error tables that are missing or out
-    of date are computed first.
+    Needs no run-up. Speeds are added where mesh orders cross modes. Missing tables are computed first.
     """
     from exugear.cli.case import open_project
     from exugear.cli.tasks import steady as task

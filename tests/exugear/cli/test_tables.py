@@ -220,7 +220,8 @@ def test_steady(printed: Printed) -> None:
     }
     lines = [f"12 x {name} - 3 x {NAMES[0]} + 2 x {NAMES[1]}" for name in NAMES]
     resonances = [Resonance(line, 123.456, -1234.5678, 12345.678, loudness).summary() for line in lines]
-    steady.print_ranking("Resonances", {"resonances": resonances, "accelerations_of": "shafts and housing"})
+    summary = {"resonances": resonances, "accelerations_of": "shafts and housing", "ranked_by": "force"}
+    steady.print_ranking("Resonances", summary)
     printed.check(1)
     assert "(3456)" in "\n".join(printed.lines)
 
