@@ -240,7 +240,7 @@ def _resonance_box(material: ReportData, headline: Headline, mode: MatchedMode |
     modes = headline.modes
     if mode is None or modes is None:
         return Box(
-            "No modes computed; run `exugear modes`." if modes is None else "No mode within 1 % of its frequency."
+            "No modes computed; run `exugear modes`." if modes is None else "No mode near its frequency."
         )
     words = material.words
     moving = {f"{body} {motion}": share for (body, motion), share in words.kinetic_energy(modes, mode.index).items()}
