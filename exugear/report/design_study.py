@@ -30,7 +30,7 @@ from exugear.report.findings.design_changes import (
     settings_of_study,
     write_design_study,
 )
-from exugear.report.findings.margins import TIP_EDGE, Margin, margins_in_words, margins_of, shortfalls_of
+from exugear.report.findings.margins import Margin, failing, margins_in_words, margins_of, shortfalls_of
 from exugear.report.findings.proposals import ASSUMPTION, DesignChange, propose_changes
 from exugear.report.findings.ranking import Resonance, ranking_of
 from exugear.report.findings.words import QUANTITIES
@@ -60,6 +60,8 @@ STATIC = "static load"
 MOST_LOAD = 3.0
 """Largest load over the static load."""
 NOT_RATED = "its life cannot be computed (`exugear life`)"
+Rated = tuple[dict[str, Margin], list[str]]
+"""Margins of a gearbox, and the parts that fall short of a requirement, as sentences."""
 _REFUSALS = (GearboxFileError, GeometryError, BearingError, BalanceError, MeshError, SteadyError)
 """Errors that say that a change cannot be made."""
 
@@ -164,11 +166,9 @@ def study_design_changes(
             objection = objection_to(effects, ranking.quantity, labels)
             # The rating takes as long as the response: only a change that is worth it is rated.
             if not objection and rated is not None and change.group != ASSUMPTION:
-                margins, failed = _margins(_project_with(project, gearbox, change.name)) or ({}, [NOT_RATED])
-                costs.append(margins_in_words(rated[0], margins))
-                edge = margins.get(TIP_EDGE)
-                if edge is not None and edge.fails and not rated[0][TIP_EDGE].fails:
-                    failed = [*failed, f"{edge.part}: {edge.value:.2g} % of the load on tip edges"]
+                changed = _margins(_project_with(project, gearbox, change.name))
+                costs.append("" if changed is None else margins_in_words(rated[0], changed[0]))
+                failed = [NOT_RATED] if changed is None else _failures(rated, changed)
                 objection = f"fails a requirement: {failed[0]}" if failed else ""
             results.append(ChangeResult(change, effects, "; ".join(filter(None, costs)), objection))
         except _REFUSALS as error:
@@ -269,7 +269,13 @@ def _project_with(project: ComputedProject, gearbox: Gearbox, name: str) -> Comp
     return changed
 
 
-def _margins(project: ComputedProject) -> tuple[dict[str, Margin], list[str]] | None:
+def _failures(before: Rated, after: Rated) -> list[str]:
+    """Return the requirements that a change fails and the unchanged gearbox does not, or not by as much."""
+    known = {line.split(" = ")[0] for line in before[1]}
+    return [*(line for line in after[1] if line.split(" = ")[0] not in known), *failing(before[0], after[0])]
+
+
+def _margins(project: ComputedProject) -> Rated | None:
     """Rate a gearbox: its margins, and what falls short; None without a load spectrum or where it cannot be rated."""
     case = project.gearbox.case
     if case.loads is None or case.rating is None:

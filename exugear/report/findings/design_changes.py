@@ -6,7 +6,8 @@ amplitude of the same order near the same speed, and the highest amplitude of an
 a change may only move a peak. Of several loads the least favourable effect counts.
 
 A change is recommended if it lowers the highest amplitude of the deciding quantity in the operating range, raises no
-other quantity there by more than `MOST_RAISED`, and fails no requirement of the rating.
+other quantity there by more than `MOST_RAISED`, and fails no requirement of the rating that the unchanged gearbox
+meets, nor falls further below one.
 """
 
 from __future__ import annotations
@@ -41,6 +42,8 @@ LEAST_DB = -60.0
 """Smallest effect that is distinguished: amplitudes may vanish except for round-off if planets mesh out of phase."""
 STEEL = 7850.0
 """Density for the mass of wider gears, kg/m3."""
+QUASI_STATIC = 1.25
+"""Ratio of the highest to the lowest amplitude of an order in the operating range up to which it is quasi-static."""
 MOST_RAISED = 1.0
 """Increase of another quantity in the operating range up to which a change is recommended, dB."""
 LEAST_LOWERED = 0.1
@@ -227,6 +230,9 @@ def peaks_of(
 ) -> dict[str, tuple[float, float]]:
     """Amplitude of an order near a frequency, and the highest amplitude of any order in a range of speeds, by quantity.
 
+    Orders whose amplitude hardly changes over the range are quasi-static and count in no range: the planets that pass,
+    for instance, load bearings and teeth in the same way at any speed, and would hide what resonances do.
+
     Parameters
     ----------
     data : as `exugear.steady.steady_file.load_response` reads it
@@ -246,7 +252,9 @@ def peaks_of(
     found = {}
     for quantity in response_quantities(data):
         sizes = quantity.sizes(amplitude).max(axis=2, initial=0.0)
-        found[quantity.name] = float(sizes[near].max(initial=0.0)), float(sizes[within].max(initial=0.0))
+        ranged = sizes[within]
+        dynamic = ranged.max(axis=0, initial=0.0) > QUASI_STATIC * ranged.min(axis=0, initial=math.inf)
+        found[quantity.name] = float(sizes[near].max(initial=0.0)), float(ranged[:, dynamic].max(initial=0.0))
     return found
 
 

@@ -77,6 +77,26 @@ def shortfalls_of(data: xr.Dataset) -> list[str]:
     return [line for key in ("failures", "shortfalls") for line in json.loads(data.attrs[key])]
 
 
+def failing(before: Mapping[str, Margin], after: Mapping[str, Margin]) -> list[str]:
+    """Return the margins that fail and are new or worse than before, as text.
+
+    Examples
+    --------
+    >>> known = {"S_H": Margin(0.9, 1.0, "pinion")}
+    >>> failing(known, known), failing(known, {"S_H": Margin(0.8, 1.0, "pinion")})
+    ([], ['pinion: S_H 0.8'])
+    """
+    found = []
+    for name, margin in after.items():
+        old = before.get(name)
+        sign = -1.0 if margin.is_largest else 1.0
+        worse = old is None or not old.fails or sign * (margin.value - old.value) < -SAME * abs(old.value)
+        if margin.fails and worse:
+            unit = f" {margin.unit}" if margin.unit else ""
+            found.append(f"{margin.part}: {name} {margin.value:{',.0f' if margin.unit == 'h' else '.3g'}}{unit}")
+    return found
+
+
 def margins_in_words(before: Mapping[str, Margin], after: Mapping[str, Margin]) -> str:
     """Describe how margins change, each next to its requirement; unchanged ones are omitted.
 

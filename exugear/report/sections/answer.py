@@ -239,9 +239,7 @@ def _strips(
 def _resonance_box(material: ReportData, headline: Headline, mode: MatchedMode | None) -> Box:
     modes = headline.modes
     if mode is None or modes is None:
-        return Box(
-            "No modes computed; run `exugear modes`." if modes is None else "No mode near its frequency."
-        )
+        return Box("No modes computed; run `exugear modes`." if modes is None else "No mode near its frequency.")
     words = material.words
     moving = {f"{body} {motion}": share for (body, motion), share in words.kinetic_energy(modes, mode.index).items()}
     assembly = material.context.assembled(headline.choice)
