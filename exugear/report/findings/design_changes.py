@@ -23,7 +23,7 @@ import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.report.findings.proposals import ASSUMPTION, GROUPS, DesignChange
-from exugear.report.findings.ranking import DECIDING
+from exugear.report.findings.ranking import DECIDING, dynamic_orders
 from exugear.steady.mean_system.signals import SIGNALS
 from exugear.steady.settings import SteadySettings, operating_speeds
 from exugear.steady.steady_file import complex_amplitudes, response_quantities
@@ -42,8 +42,6 @@ LEAST_DB = -60.0
 """Smallest effect that is distinguished: amplitudes may vanish except for round-off if planets mesh out of phase."""
 STEEL = 7850.0
 """Density for the mass of wider gears, kg/m3."""
-QUASI_STATIC = 1.25
-"""Ratio of the highest to the lowest amplitude of an order in the operating range up to which it is quasi-static."""
 MOST_RAISED = 1.0
 """Increase of another quantity in the operating range up to which a change is recommended, dB."""
 LEAST_LOWERED = 0.1
@@ -230,8 +228,7 @@ def peaks_of(
 ) -> dict[str, tuple[float, float]]:
     """Amplitude of an order near a frequency, and the highest amplitude of any order in a range of speeds, by quantity.
 
-    Orders whose amplitude hardly changes over the range are quasi-static and count in no range: the planets that pass,
-    for instance, load bearings and teeth in the same way at any speed, and would hide what resonances do.
+    Quasi-static orders do not count in the range, see `exugear.report.findings.ranking.dynamic_orders`.
 
     Parameters
     ----------
@@ -253,8 +250,8 @@ def peaks_of(
     for quantity in response_quantities(data):
         sizes = quantity.sizes(amplitude).max(axis=2, initial=0.0)
         ranged = sizes[within]
-        dynamic = ranged.max(axis=0, initial=0.0) > QUASI_STATIC * ranged.min(axis=0, initial=math.inf)
-        found[quantity.name] = float(sizes[near].max(initial=0.0)), float(ranged[:, dynamic].max(initial=0.0))
+        highest = ranged[:, dynamic_orders(ranged)].max(initial=0.0)
+        found[quantity.name] = float(sizes[near].max(initial=0.0)), float(highest)
     return found
 
 

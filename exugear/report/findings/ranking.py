@@ -275,15 +275,44 @@ class Envelope:
     """(n,) in the unit of the quantity."""
 
 
-def envelopes(data: xr.Dataset) -> dict[str, Envelope]:
+QUASI_STATIC = 1.25
+"""Ratio of the highest to the lowest amplitude of an order in a range of speeds up to which it is quasi-static."""
+
+
+def dynamic_orders(amplitude: Floats) -> Booleans:
+    """Return which orders are not quasi-static.
+
+    Amplitudes of quasi-static orders hardly change with speed: the planets that pass, for instance, load bearings and
+    teeth in the same way at any speed, and would hide what resonances do.
+
+    Parameters
+    ----------
+    amplitude : (points, orders) in a range of speeds
+
+    Examples
+    --------
+    >>> dynamic_orders(np.array([[5.0, 1.0], [5.2, 3.0]]))
+    array([False,  True])
+    """
+    highest = amplitude.max(axis=0, initial=0.0)
+    return np.asarray(highest > QUASI_STATIC * amplitude.min(axis=0, initial=np.inf))
+
+
+def envelopes(data: xr.Dataset, within: tuple[float, float] | None = None) -> dict[str, Envelope]:
     """Return the largest amplitude of a single order at each speed, by quantity, of the bearing with the largest.
 
     Parameters
     ----------
     data : as `exugear.steady.steady_file.load_response` reads it
+    within : range of speeds (rad/s); orders that are quasi-static there are omitted
     """
     speed = np.sort(np.abs(data["speed"].to_numpy().astype(np.float64)))
-    return {name: Envelope(speed, values.max(axis=1)) for name, values in order_amplitudes(data).items()}
+    inside = np.ones(len(speed), bool) if within is None else (speed >= within[0]) & (speed <= within[1])
+    found = {}
+    for name, values in order_amplitudes(data).items():
+        counted = dynamic_orders(values[inside]) if within is not None else np.ones(values.shape[1], bool)
+        found[name] = Envelope(speed, values[:, counted].max(axis=1, initial=0.0))
+    return found
 
 
 def order_amplitudes(data: xr.Dataset) -> dict[str, Floats]:

@@ -23,7 +23,7 @@ from exugear.report.findings.headline import (
     contributions_of,
 )
 from exugear.report.findings.parameter_variations import default_place, track_mode
-from exugear.report.findings.ranking import HOUSING, SHAFTS, Envelope, Resonance
+from exugear.report.findings.ranking import HOUSING, SHAFTS, Envelope, Resonance, envelopes
 from exugear.report.findings.words import QUANTITIES, percentages, rounded_text
 from exugear.report.pictures.png import png_address
 from exugear.report.pictures.speed_diagrams import NUMBERED, CampbellDrawing, Strips, campbell_of, strips_of
@@ -90,6 +90,10 @@ def short_section(material: ReportData) -> Part:
     known = contributions_of(material.context, headline)
     found = headline.envelopes(material.lines)
     curves = {name: found[name] for name in _sorted_quantities(headline, top) if name in found}
+    drawn = curves
+    if headline.response is not None:
+        dynamic = envelopes(headline.response, headline.ranking.speeds)
+        drawn = {name: dynamic[name] for name in curves}
     answer: dict[str, Any] = {
         "scope": _scope(material, headline),
         "kicker": _kicker(headline),
@@ -99,7 +103,8 @@ def short_section(material: ReportData) -> Part:
         "sentence": _sentence(material, headline, top, mode),
         "quantities": [_quantity(material, headline, top, name) for name in _sorted_quantities(headline, top)],
         "note": _note(material, headline),
-        "strips": [_strips(material, headline, curves, size) for size in STRIPS if curves],
+        "strips": [_strips(material, headline, drawn, size) for size in STRIPS if drawn],
+        "drawn": "largest order, quasi-static ones omitted" if headline.response is not None else "largest single order",
         "resonance": _resonance_box(material, headline, mode),
         "cause": _cause_box(material, top, known),
         "remedy": _remedy_box(material, headline),
@@ -277,7 +282,7 @@ def _cause_box(material: ReportData, top: Resonance, known: Contributions | None
     shared = [cause for cause in causes if cause.share is not None]
     if shared:
         shares = ", ".join(f"{material.words.of(cause.pair)} {100.0 * (cause.share or 0.0):.0f} %" for cause in shared)
-        facts.append(("Contribution to the transmission error", shares))
+        facts.append(("TE contribution", shares))
     overlap = f"{rounded_text(first.overlap)}"
     if first.overlap == 0.0:
         overlap += " (spur gears)"

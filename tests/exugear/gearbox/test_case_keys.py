@@ -45,7 +45,7 @@ from ..cases import gear_trains
 from ..cases.case_mutations import bases, toml_text
 
 ELSEWHERE = {f"GearboxFile.{table}" for table in ("labels", "operation", "loads", "rating", "lubricant")}
-ELSEWHERE |= {"CatalogueSection.fatigue_load_limit_kN"}
+ELSEWHERE |= {"CatalogueSection.fatigue_load_limit_kN", "ReportSection.quantity"}
 """Keys of pages and of a life, whose computation takes too long here: another test looks for them in the program."""
 FOR_PEOPLE = {
     "LoadCaseSection.description",
