@@ -32,7 +32,14 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from exugear.system.kernels.coordinates import AXIAL, BODY_SIZE, PADDED, PADDED_SPIN, PADDED_TILT, SPIN, TILT
-from exugear.system.kernels.table_law import NOMINAL_DISTANCE, NOMINAL_MISALIGNMENT, Scratch, TableArrays, piece_at
+from exugear.system.kernels.table_law import (
+    NOMINAL_DEFLECTION,
+    NOMINAL_DISTANCE,
+    NOMINAL_MISALIGNMENT,
+    Scratch,
+    TableArrays,
+    piece_at,
+)
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import compiled, kernel
 from fe_ste.tools.octets import eight, put, sum_of
@@ -44,14 +51,17 @@ SPIN_1 = SPIN
 SPIN_2 = BODY_SIZE + SPIN
 
 DEFLECTION, RATE, PMC, STIFFNESS, FORCE, ENERGY, DAMPED_POWER, CYCLE_POWER, OTHER_POWER = range(9)
-FRICTION_POWER, OUTSIDE = range(9, 11)
-"""Columns of `mesh_state`.
+FRICTION_POWER, OUTSIDE, CENTRE_CHANGE, CENTRE_RATE, MISALIGNMENT, FRICTION = range(9, 15)
+"""Columns of the states of meshes.
 
 Deflection (m), its rate (m/s), pmc in [0, 1), tangent stiffness (N/m), F_bt (N, negative on the other flank), elastic
 energy (J); powers (W): damped, of the stiffness that changes with pmc, of a force that is not conjugate to its
-deflection, of friction of the teeth; 1 where the mesh is outside its table.
+deflection, of friction of the teeth; 1 where the mesh is outside its table. Loops over time leave pmc and stiffness
+out, and keep of tables the change of the centre distance (m), its rate (m/s) and the misalignment (rad), and the
+friction force across the line of action (N).
 """
-STATE_SIZE = 11
+STATE_SIZE, STATES_SIZE = 11, 15
+"""Columns of `mesh_state`, and of `MeshMemory.states`."""
 TILT_STIFFNESS, TILT_DAMPING, TILT_LEVER, TILT_MOMENT, TILT_REST = range(5)
 """Columns of `MeshArrays.tilt`."""
 TILT_COLUMNS = 5
@@ -144,30 +154,27 @@ def periodic_cubic(samples: Floats) -> Floats:
 
 
 @kernel
-def stiffness_at(coefficients: Floats, pieces: int, pmc: float) -> tuple[float, float]:
-    """Return stiffness (N/m) and its slope per cycle at any position in the mesh cycle; coefficients (n, 4)."""
-    # pmc is unwrapped: its fraction selects the piece, and t in [0, 1) is the position in that piece.
-    scaled = (pmc - math.floor(pmc)) * pieces
+def piece_of(x: float, pieces: int) -> tuple[int, float]:
+    """Piece of a function of period 1 at any position x, and the place in it from 0 to 1."""
+    scaled = (x - math.floor(x)) * pieces
     piece = piece_at(scaled, pieces)
-    t = scaled - piece
-    c = coefficients[piece]
-    value: float = c[0] + t * (c[1] + t * (c[2] + t * c[3]))
-    # The derivative of the cubic is per piece, with `pieces` of them in a cycle.
-    slope = (c[1] + t * (2.0 * c[2] + t * 3.0 * c[3])) * pieces
-    return value, slope
+    return piece, scaled - piece
 
 
 @kernel
-def shuttling_at(coefficients: Floats, pieces: int, pmc: float) -> tuple[float, float, float, float]:
-    """Axial position (m) and moment (N m) from coefficients (n, 8), with slopes per cycle, as in `stiffness_at`."""
-    scaled = (pmc - math.floor(pmc)) * pieces
-    piece = piece_at(scaled, pieces)
-    t = scaled - piece
-    c = coefficients[piece]
-    way: float = c[0] + t * (c[1] + t * (c[2] + t * c[3]))
-    moving = (c[1] + t * (2.0 * c[2] + t * 3.0 * c[3])) * pieces
-    moment: float = c[4] + t * (c[5] + t * (c[6] + t * c[7]))
-    return way, moving, moment, (c[5] + t * (2.0 * c[6] + t * 3.0 * c[7])) * pieces
+def cubic_at(c: Floats, first: int, t: float) -> tuple[float, float, float]:
+    """Cubic with the four coefficients from `first` on, and its two derivatives by t."""
+    value: float = c[first] + t * (c[first + 1] + t * (c[first + 2] + t * c[first + 3]))
+    slope = c[first + 1] + t * (2.0 * c[first + 2] + t * 3.0 * c[first + 3])
+    return value, slope, 2.0 * c[first + 2] + 6.0 * t * c[first + 3]
+
+
+@kernel
+def stiffness_at(coefficients: Floats, pieces: int, pmc: float) -> tuple[float, float]:
+    """Return stiffness (N/m) and its slope per cycle at any position in the mesh cycle; coefficients (n, 4)."""
+    piece, t = piece_of(pmc, pieces)
+    value, slope, _ = cubic_at(coefficients[piece], 0, t)
+    return value, slope * pieces
 
 
 @kernel
@@ -214,21 +221,15 @@ def frame_row(q: Floats, index: Integers, axis: Floats, row: Floats, gradient: F
 
 
 @kernel
-def error_at(m: int, end: int, angle: float, meshes: MeshArrays) -> tuple[float, float, float]:
+def error_at(m: int, end: int, angle: float, meshes: MeshArrays | Meshes) -> tuple[float, float, float]:
     """Deviation (m) of one gear of mesh m at its angle (rad) relative to the frame, with two derivatives by it."""
     pieces = meshes.error_pieces[m, end]
     if pieces == 0:
         return 0.0, 0.0, 0.0
-    # As in `stiffness_at`, over a revolution instead of a mesh cycle.
-    turns = angle / (2.0 * math.pi)
-    scaled = (turns - math.floor(turns)) * pieces
-    piece = piece_at(scaled, pieces)
-    t = scaled - piece
-    c = meshes.error[m, end, piece]
+    piece, t = piece_of(angle / (2.0 * math.pi), pieces)
     per_rad = pieces / (2.0 * math.pi)
-    value: float = c[0] + t * (c[1] + t * (c[2] + t * c[3]))
-    slope = (c[1] + t * (2.0 * c[2] + t * 3.0 * c[3])) * per_rad
-    return value, slope, (2.0 * c[2] + 6.0 * t * c[3]) * per_rad * per_rad
+    value, slope, curvature = cubic_at(meshes.error[m, end, piece], 0, t)
+    return value, slope * per_rad, curvature * per_rad * per_rad
 
 
 @kernel
@@ -264,11 +265,15 @@ def mesh_pmc(q: Floats, m: int, meshes: MeshArrays) -> float:
 
 
 @kernel
-def load_way(m: int, pmc: float, meshes: MeshArrays) -> tuple[float, float, float, float]:
+def load_way(m: int, pmc: float, meshes: MeshArrays | Meshes) -> tuple[float, float, float, float]:
     """Axial position w (m) of mesh m's load centroid and moment F0 (c - w) (N m), each with its slope per cycle."""
-    if meshes.way_pieces[m] == 0:
+    pieces = meshes.way_pieces[m]
+    if pieces == 0:
         return 0.0, 0.0, 0.0, 0.0
-    return shuttling_at(meshes.way[m], meshes.way_pieces[m], pmc)
+    piece, t = piece_of(pmc, pieces)
+    way, moving, _ = cubic_at(meshes.way[m, piece], 0, t)
+    moment, changing, _ = cubic_at(meshes.way[m, piece], MOMENT_BEYOND, t)
+    return way, moving * pieces, moment, changing * pieces
 
 
 @kernel
@@ -340,28 +345,71 @@ def gear_positions(q: Floats, meshes: MeshArrays, out: Floats) -> None:
         out[m, 1] = gear_position(q, m, meshes, table.misalignment[m], table.nominal[m, NOMINAL_MISALIGNMENT])
 
 
+# Readings of a flank, which the laws of the meshes see, with their gradients
+
+BY_DELTA, BY_CENTRE, BY_TILT, BY_PMC = range(4)
+"""Readings of a flank: deflection (m), centre distance (m), misalignment (rad), position in the mesh cycle."""
+READINGS, RATES, FORCES, BEND, STRAIGHT, ALONG, ALONG_TURNING, DAMPING, ACTING, STATE = range(10)
+GRADIENTS = STATE + 1
+TURNINGS = GRADIENTS + 4
+RATE_GRADIENTS = TURNINGS + 3
+SLOPES = RATE_GRADIENTS + 3
+RATE_SLOPES = SLOPES + 3
+SECOND_SLOPES = RATE_SLOPES + 3
+BY_Q = SECOND_SLOPES + 4
+BY_V = BY_Q + ROW_SIZE
+MEMORY = BY_V + ROW_SIZE
+"""Rows of the memory of a mesh, (`MEMORY`, 13): vectors of a flank, state and negative force of the mesh, and the
+derivatives of this."""
+
+
+@kernel
+def read_flank(q: Floats, v: Floats, m: int, side: int, sense: float, meshes: MeshArrays, memory: Floats) -> None:
+    """Fill readings of one flank (1, -1), rates, gradients (4, 13), and these differentiated by the frame's angle.
+
+    The misalignment counts in the sense (1, -1) of the law.
+    """
+    index = meshes.coordinates[m]
+    axis = meshes.axis[m]
+    table = meshes.table
+    readings = memory[READINGS]
+    gradients = memory[GRADIENTS:TURNINGS]
+    turnings = memory[TURNINGS:RATE_GRADIENTS]
+    row, tilt_row, offset = meshes.deflection[m], table.misalignment[m], table.nominal[m, NOMINAL_DEFLECTION]
+    phase, cycles = meshes.phase[m], meshes.cycles[m]
+    if side < 0:
+        # The other flank closes when the loaded one opens by the backlash, and its cycle runs the other way.
+        row, tilt_row, offset = table.back[m], table.back_misalignment[m], -offset - table.backlash[m]
+        phase, cycles = table.back_phase[m], -cycles
+    readings[BY_DELTA] = offset + net_deflection(
+        q, m, meshes, row, float(side), gradients[BY_DELTA], turnings[BY_DELTA], memory[BEND]
+    )
+    readings[BY_CENTRE] = table.nominal[m, NOMINAL_DISTANCE] + frame_row(
+        q, index, axis, table.centre[m], gradients[BY_CENTRE], turnings[BY_CENTRE]
+    )
+    tilt = frame_row(q, index, axis, tilt_row, gradients[BY_TILT], turnings[BY_TILT])
+    readings[BY_TILT] = sense * (table.nominal[m, NOMINAL_MISALIGNMENT] - meshes.tilt[m, TILT_REST] + tilt)
+    readings[BY_PMC] = phase + cycles * relative_spin(q, index, 0)
+    gradients[BY_PMC] = 0.0
+    gradients[BY_PMC, SPIN_1], gradients[BY_PMC, FRAME] = cycles, -cycles
+    for i in range(ROW_SIZE):
+        gradients[BY_TILT, i] *= sense
+        turnings[BY_TILT, i] *= sense
+    for a in range(4):
+        memory[RATES, a] = row_dot(index, gradients[a], v)
+
+
 # Compiled geometry of gear meshes, optimised for speed: value, rate and gradient of a row in one pass
 
 ALONG_DEFLECTION, ALONG_FORCE, TABLE_FORCE = range(3)
 """Rows of `MeshMemory.gradient`."""
-LAST_DEFLECTION, LAST_RATE, LAST_OUTSIDE, LAST_FORCE, LAST_ENERGY, LAST_DAMPED, LAST_CYCLE, LAST_OTHER = range(8)
-LAST_CENTRE, LAST_MISALIGNMENT, LAST_CENTRE_RATE, LAST_FRICTION, LAST_FRICTION_POWER = range(8, 13)
-"""Columns of `MeshMemory.states`: deflection (m), rate (m/s), 1 outside a table, scalar force (N; of a table F_bt), and
-the terms of the mesh in the energy balance: elastic energy (J); dissipated power, power of the stiffness that changes
-with pmc, and power of a force that is not conjugate to its deflection (W); for tables, change of centre distance (m),
-misalignment (rad) and rate of the centre distance (m/s); friction force across the line of action (N), and power that
-friction dissipates (W).
-"""
-STATES_SIZE = 13
 DEFLECTION_ROW, FORCE_ROW, FRICTION_ROW = range(3)
 """Rows of `Meshes.rows`; those of friction are the last three."""
 FIXED, ALONG_COSINE, ALONG_SINE, SECOND = range(0, 4 * PADDED, PADDED)
 """First columns of the parts of each row, and first column of the second gear."""
-TILT_ROW_X, TILT_ROW_Y, TILT_SHIFT, TILT_RESISTANCE, TILT_DAMPER, TILT_ARM, TILT_PUSH = range(7)
-"""Columns of `Meshes.tilt`: the misalignment's row over the tilts of gear 1, its negative being that of gear 2;
-misalignment at zero tilts relative to that of the contact state (rad); tilt stiffness, damping, lever and moment as in
-`MeshArrays.tilt`.
-"""
+TILT_SHIFT, TILT_ROW_X, TILT_ROW_Y = range(4, 7)
+"""Columns of `Meshes.tilt` behind those that it shares with `MeshArrays.tilt`: misalignment at zero tilts relative to
+that of the contact state (rad), and its row over the tilts of gear 1, whose negative is that of gear 2."""
 PADDED_FRAME = 2 * PADDED
 """Index of the frame's angle in a gradient of `MeshMemory.gradients`, after two padded gears."""
 KINETIC, ELASTIC, OF_LOADS, DISSIPATED, OF_VARYING_STIFFNESS, NON_CONSERVATIVE, OF_FRICTION, OF_BEARING_RATES = range(8)
@@ -432,7 +480,7 @@ class MeshMemory(NamedTuple):
     gradients: Floats
     """(4, 17) gradients over two padded positions and the frame's angle; the last one is a sum."""
     states: Floats
-    """(m, 13) state of each mesh, columns as named in this module."""
+    """(m, 15) state of each mesh, columns as named in this module."""
     pieces: Integers
     """(m, 2) load piece of each flank's table that was used last."""
     law: Scratch | None
@@ -604,19 +652,6 @@ def mesh_row(
 
 
 @kernel
-def error_and_slope_at(m: int, end: int, angle: float, meshes: Meshes) -> tuple[float, float]:
-    """Deviation (m) of one gear of mesh m at its angle (rad) relative to the frame, and its slope per rad."""
-    pieces = meshes.error_pieces[m, end]
-    turns = angle / (2.0 * math.pi)
-    scaled = (turns - math.floor(turns)) * pieces
-    piece = piece_at(scaled, pieces)
-    t = scaled - piece
-    c = meshes.error[m, end, piece]
-    slope = (c[1] + t * (2.0 * c[2] + t * 3.0 * c[3])) * pieces / (2.0 * math.pi)
-    return c[0] + t * (c[1] + t * (c[2] + t * c[3])), slope
-
-
-@kernel
 def subtract_errors(
     q: Floats, v: Floats, m: int, side: float, meshes: Meshes, gradient: Floats, size: int, spin_place: int, frame: int
 ) -> tuple[float, float]:
@@ -632,7 +667,7 @@ def subtract_errors(
         if meshes.error_pieces[m, end] > 0:
             spin = index[BODY_SIZE * end + SPIN]
             psi = index[FRAME]
-            error, slope = error_and_slope_at(m, end, q[spin] - q[psi], meshes)
+            error, slope, _ = error_at(m, end, q[spin] - q[psi], meshes)
             # A flank below its nominal position closes the gap later; for the other flank the sign is opposite (side
             # -1).
             delta -= side * error

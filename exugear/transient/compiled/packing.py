@@ -19,9 +19,6 @@ from exugear.system.kernels.meshes import (
     SPIN_1,
     SPIN_2,
     STATES_SIZE,
-    TILT_DAMPING,
-    TILT_LEVER,
-    TILT_MOMENT,
     TILT_REST,
     TILT_STIFFNESS,
     MeshArrays,
@@ -438,7 +435,7 @@ def _tilts(given: MeshArrays) -> Floats:
     """How meshes resist misalignment, (m, 7): `Meshes.tilt`."""
     rows = given.table.misalignment[:, TILT : TILT + 2]
     shift = given.table.nominal[:, NOMINAL_MISALIGNMENT] - given.tilt[:, TILT_REST]
-    return np.column_stack([rows, shift, given.tilt[:, [TILT_STIFFNESS, TILT_DAMPING, TILT_LEVER, TILT_MOMENT]]])
+    return np.column_stack([given.tilt[:, :TILT_REST], shift, rows])
 
 
 def _joints(numbers: _Numbers) -> Joints | None:

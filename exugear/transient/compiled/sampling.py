@@ -20,25 +20,25 @@ from exugear.system.kernels.coordinates import (
 )
 from exugear.system.kernels.elastic import motion_energies
 from exugear.system.kernels.meshes import (
+    CENTRE_CHANGE,
+    CYCLE_POWER,
+    DAMPED_POWER,
+    DEFLECTION,
     DISSIPATED,
     ELASTIC,
+    ENERGY,
+    FORCE,
+    FRICTION,
+    FRICTION_POWER,
     KINETIC,
-    LAST_CENTRE,
-    LAST_CYCLE,
-    LAST_DAMPED,
-    LAST_DEFLECTION,
-    LAST_ENERGY,
-    LAST_FORCE,
-    LAST_FRICTION,
-    LAST_FRICTION_POWER,
-    LAST_MISALIGNMENT,
-    LAST_OTHER,
-    LAST_OUTSIDE,
+    MISALIGNMENT,
     NON_CONSERVATIVE,
     OF_BEARING_RATES,
     OF_FRICTION,
     OF_LOADS,
     OF_VARYING_STIFFNESS,
+    OTHER_POWER,
+    OUTSIDE,
     Meshes,
 )
 from exugear.system.kernels.rolling import (
@@ -99,17 +99,17 @@ def observe_meshes(meshes: Meshes, work: Work, columns: Columns, sample: Floats,
     """Fill the signals of each mesh into a sample; add energy and powers (see `take_sample`)."""
     for m in range(meshes.coordinates.shape[0]):
         state = work.mesh.states[m]
-        sample[columns.mesh_dte + m] = state[LAST_DEFLECTION]
-        sample[columns.mesh_force + m] = state[LAST_FORCE] * meshes.line_of_action[m]
-        energy[ELASTIC] += state[LAST_ENERGY]
-        energy[DISSIPATED] += state[LAST_DAMPED]
-        energy[OF_VARYING_STIFFNESS] += state[LAST_CYCLE]
-        energy[NON_CONSERVATIVE] += state[LAST_OTHER]
-        energy[OF_FRICTION] += state[LAST_FRICTION_POWER]
+        sample[columns.mesh_dte + m] = state[DEFLECTION]
+        sample[columns.mesh_force + m] = state[FORCE]
+        energy[ELASTIC] += state[ENERGY]
+        energy[DISSIPATED] += state[DAMPED_POWER]
+        energy[OF_VARYING_STIFFNESS] += state[CYCLE_POWER]
+        energy[NON_CONSERVATIVE] += state[OTHER_POWER]
+        energy[OF_FRICTION] += state[FRICTION_POWER]
         if meshes.form[m] == TABLE_FORM:
-            sample[columns.outside_table + m] = state[LAST_OUTSIDE]
-            sample[columns.centre_distance_change + m] = state[LAST_CENTRE]
-            sample[columns.misalignment + m] = state[LAST_MISALIGNMENT]
+            sample[columns.outside_table + m] = state[OUTSIDE]
+            sample[columns.centre_distance_change + m] = state[CENTRE_CHANGE]
+            sample[columns.misalignment + m] = state[MISALIGNMENT]
 
 
 @kernel
@@ -226,7 +226,7 @@ def observe_connectors(
 @kernel
 def acting_row(m: int, meshes: Meshes, table: TableArrays | None, work: Work) -> tuple[float, Floats]:
     """Scalar force of mesh m (N) and the row that it acts along."""
-    force = work.mesh.states[m, LAST_FORCE]
+    force = work.mesh.states[m, FORCE] / meshes.line_of_action[m]
     row = meshes.force[m]
     if table is None:
         return force, row
@@ -257,7 +257,7 @@ def observe_joints(
             j = joints.ends[m, end]
             if j >= 0:
                 force, row = acting_row(m, meshes, table, work)
-                across = work.mesh.states[m, LAST_FRICTION]
+                across = work.mesh.states[m, FRICTION]
                 along_x = BODY_SIZE * end
                 x = force * row[along_x] + across * meshes.friction_rows[m, 0, along_x]
                 y = force * row[along_x + 1] + across * meshes.friction_rows[m, 0, along_x + 1]

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from exugear.system.kernels.meshes import FRAME, LAST_DEFLECTION, LAST_FORCE, SPIN_1, SPIN_2, Meshes
+from exugear.system.kernels.meshes import DEFLECTION, FORCE, FRAME, SPIN_1, SPIN_2, Meshes
 from exugear.system.loads import LoadTable
 from exugear.system.modes import overall_row
 from exugear.system.signals import ENERGIES, POWERS, SignalLayout, signal_layout
@@ -116,9 +116,10 @@ def correct_spinning_meshes(step: float, method: Method, past: StepHistory, mesh
         frame = corrected_by(index[FRAME], past, work)
         change = meshes.deflection[m, SPIN_1] * (corrected_by(index[SPIN_1], past, work) - frame)
         change += meshes.deflection[m, SPIN_2] * (corrected_by(index[SPIN_2], past, work) - frame)
-        state[LAST_DEFLECTION] += of_q * change
-        if state[LAST_FORCE] != 0.0:  # teeth that are apart stay so
-            state[LAST_FORCE] += (meshes.mean[m, 0] * of_q + meshes.mean[m, 1] * of_v) * change
+        state[DEFLECTION] += of_q * change
+        if state[FORCE] != 0.0:  # teeth that are apart stay so
+            force = (meshes.mean[m, 0] * of_q + meshes.mean[m, 1] * of_v) * change
+            state[FORCE] += force * meshes.line_of_action[m]
 
 
 @kernel

@@ -16,6 +16,7 @@ from exugear.system.kernels.meshes import (
     DEFLECTION,
     ENERGY,
     FORCE,
+    MEMORY,
     OUTSIDE,
     ROW_SIZE,
     STATE_SIZE,
@@ -36,7 +37,7 @@ from exugear.system.modes import overall_row
 from exugear.system.signals import signal_layout
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.friction import friction_part, friction_size
-from exugear.system.tooth_mesh.laws.mesh_forces import MEMORY, pass_meshes
+from exugear.system.tooth_mesh.laws.mesh_forces import pass_meshes
 from fe_ste.tools.compilation import compiled
 
 from .plain_connectors import connector_load, connector_motion, memory_for, turn_between

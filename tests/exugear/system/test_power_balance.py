@@ -16,27 +16,32 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.system.kernels.coordinates import add_spring_forces
 from exugear.system.kernels.meshes import (
+    BY_TILT,
     CYCLE_POWER,
     DAMPED_POWER,
     ENERGY,
     FORCE,
+    MEMORY,
     PMC,
     RATE,
+    RATES,
+    READINGS,
     ROW_SIZE,
+    STATE,
     STATE_SIZE,
     TILT_DAMPING,
     TILT_LEVER,
     TILT_MOMENT,
     TILT_STIFFNESS,
     load_way,
-    row_dot,
+    read_flank,
 )
 from exugear.system.kernels.table_law import scratch_memory
 from exugear.system.loads import LoadTable
 from exugear.system.signals import signal_layout
 from exugear.system.statics import accelerating_start
 from exugear.system.system import Assembly
-from exugear.system.tooth_mesh.laws.mesh_forces import MEMORY, TILTING, pass_meshes, tilted
+from exugear.system.tooth_mesh.laws.mesh_forces import pass_meshes
 from exugear.transient.compiled.integrator import choose_integration
 from exugear.transient.compiled.solver import CompiledSystem
 from fe_ste.tools.compilation import compiled
@@ -55,16 +60,18 @@ passes through; so the limit is lower, and the law's account has one in terms of
 
 
 @compiled
-def tilting_power(q, v, mesh, state, memory):
+def tilting_power(q, v, mesh, memory):
     """Power of the moment of one mesh along its misalignment, W, by `exugear.system.tooth_mesh.contact_state`."""
     resists = mesh.tilt[0]
     if resists[TILT_STIFFNESS] == 0.0:
         return 0.0
-    turned = tilted(q, 0, mesh, memory)
-    rate = row_dot(mesh.coordinates[0], memory[TILTING], v)
-    force, damper = state[FORCE] / mesh.line_of_action[0], mesh.damping[0] * (state[RATE] - resists[TILT_LEVER] * rate)
+    read_flank(q, v, 0, 1, 1.0, mesh, memory)
+    turned, rate = memory[READINGS, BY_TILT], memory[RATES, BY_TILT]
+    force, damper = memory[STATE, FORCE] / mesh.line_of_action[0], mesh.damping[0] * (
+        memory[STATE, RATE] - resists[TILT_LEVER] * rate
+    )
     moment = resists[TILT_MOMENT] - resists[TILT_STIFFNESS] * turned - resists[TILT_DAMPING] * rate
-    way, _, beyond, _ = load_way(0, state[PMC], mesh)
+    way, _, beyond, _ = load_way(0, memory[STATE, PMC], mesh)
     moment += resists[TILT_LEVER] * force + way * (force - damper) + beyond
     return moment * rate
 
@@ -84,7 +91,7 @@ def mesh_powers(q, v, mesh, out):
         out[n, 1] = state[0, DAMPED_POWER]
         out[n, 2] = -state[0, CYCLE_POWER]
         out[n, 3] = state[0, ENERGY]
-        out[n, 4] = out[n, 0] - tilting_power(q[n], v[n], mesh, state[0], memory)
+        out[n, 4] = out[n, 0] - tilting_power(q[n], v[n], mesh, memory)
 
 
 @compiled

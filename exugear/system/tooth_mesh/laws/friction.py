@@ -19,25 +19,24 @@ from exugear.system.kernels.meshes import (
     DEFLECTION_ROW,
     FORCE,
     FRAME,
+    FRICTION,
     FRICTION_POWER,
     FRICTION_ROW,
-    LAST_FORCE,
-    LAST_FRICTION,
-    LAST_FRICTION_POWER,
     ROW_SIZE,
     SPIN_1,
     SPIN_2,
     MeshArrays,
     Meshes,
     MeshWork,
+    cubic_at,
     frame_row,
     mesh_pmc,
+    piece_of,
     push_apart,
     relative_spin,
     row_dot,
     row_motion,
 )
-from exugear.system.kernels.table_law import piece_at
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import kernel
 
@@ -50,12 +49,8 @@ SLOW_SLIDING = 1e-3
 @kernel
 def friction_part(part: int, coefficients: Floats, pieces: int, pmc: float) -> float:
     """One of the force and moments per unit mesh force at a position in the mesh cycle; coefficients (p, 12)."""
-    scaled = (pmc - math.floor(pmc)) * pieces
-    piece = piece_at(scaled, pieces)
-    t = scaled - piece
-    c = coefficients[piece, 4 * part : 4 * part + 4]
-    value: float = c[0] + t * (c[1] + t * (c[2] + t * c[3]))
-    return value
+    piece, t = piece_of(pmc, pieces)
+    return cubic_at(coefficients[piece], 4 * part, t)[0]
 
 
 @kernel
@@ -104,10 +99,10 @@ def add_friction_loads(q: Floats, v: Floats, m: int, meshes: Meshes, work: MeshW
     i = index[SPIN_1]
     j = index[SPIN_2]
     k = index[FRAME]
-    size = friction_size(state[LAST_FORCE] * meshes.line_of_action[m], v[i] - v[j], meshes.friction_speed[m])
+    size = friction_size(state[FORCE], v[i] - v[j], meshes.friction_speed[m])
     pmc = meshes.phase[m] + meshes.cycles[m] * (q[i] - q[k])
-    state[LAST_FRICTION] = size * friction_part(0, meshes.friction[m], meshes.friction_pieces[m], pmc)
-    state[LAST_FRICTION_POWER] = 0.0
+    state[FRICTION] = size * friction_part(0, meshes.friction[m], meshes.friction_pieces[m], pmc)
+    state[FRICTION_POWER] = 0.0
     gradient = work.mesh.gradients[DEFLECTION_ROW]
     c = work.turns[meshes.slot[m], COSINE]
     s = work.turns[meshes.slot[m], SINE]
@@ -124,4 +119,4 @@ def add_friction_loads(q: Floats, v: Floats, m: int, meshes: Meshes, work: MeshW
         else:
             _, rate = row_motion(m, FRICTION_ROW + part, q[k], v[k], c, s, meshes, work.places, gradient)
             push_apart(m, -force, gradient, meshes, work)
-        state[LAST_FRICTION_POWER] -= force * rate
+        state[FRICTION_POWER] -= force * rate

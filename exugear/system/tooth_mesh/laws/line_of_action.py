@@ -21,8 +21,7 @@ import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Mesh
-from exugear.system.kernels.meshes import periodic_cubic, stiffness_at
-from exugear.system.kernels.table_law import piece_at
+from exugear.system.kernels.meshes import cubic_at, periodic_cubic, piece_of, stiffness_at
 from exugear.system.tooth_mesh.element import Law, MeshCurve, MeshData
 from exugear.system.tooth_mesh.placement import MeshError
 from exugear.system.tooth_mesh.tables import fitting_table, table_path, wanted_table
@@ -119,15 +118,13 @@ def curve_law(
     coefficients: Floats, pieces: int, delta: float, pmc: float, cycling: float
 ) -> tuple[float, float, float, float, float]:
     """Do as `stiffness_law` for the curve of coefficients (n, 9)."""
-    scaled = (pmc - math.floor(pmc)) * pieces
-    piece = piece_at(scaled, pieces)
-    t = scaled - piece
+    piece, t = piece_of(pmc, pieces)
     c = coefficients[piece]
-    k = c[0] + t * (c[1] + t * (c[2] + t * c[3]))
-    k_slope = (c[1] + t * (2.0 * c[2] + t * 3.0 * c[3])) * pieces
-    n = c[4] + t * (c[5] + t * (c[6] + t * c[7]))
-    n_slope = (c[5] + t * (2.0 * c[6] + t * 3.0 * c[7])) * pieces
-    force, tangent, force_by_pmc, energy, energy_by_pmc = curve_of(k, k_slope, n, n_slope, c[PER_LOAD], delta)
+    k, k_slope, _ = cubic_at(c, 0, t)
+    n, n_slope, _ = cubic_at(c, EXPONENT, t)
+    force, tangent, force_by_pmc, energy, energy_by_pmc = curve_of(
+        k, k_slope * pieces, n, n_slope * pieces, c[PER_LOAD], delta
+    )
     return force, tangent, force_by_pmc, energy, -energy_by_pmc * cycling
 
 

@@ -1,13 +1,13 @@
-"""Forces of all meshes in one pass, each in the form of its model, in a plain version and one for loops over time.
+"""Forces of all meshes: one law for each model, one chain rule from its readings to the coordinates.
 
-Forms are numbered (`MeshArrays.form`). All except the model `table` depend on the deflection along a row and are
-implemented here; the model `table` also depends on the positions of the gears.
+A law sees readings of a flank: deflection, centre distance, misalignment, position in the mesh cycle, and their rates.
+It returns what acts along the first three. Laws along a row are `row_law` with the resistance to misalignment and the
+shuttling of the load (`row_flank`); the model `table` is `exugear.system.tooth_mesh.laws.table.table_flank`. Friction
+of the teeth is added to the force of any model (`exugear.system.tooth_mesh.laws.friction`).
 
-The model itself is implemented once, in `row_law`: a model with its own force is a branch there. The other functions
-implement common parts: damping, resistance of teeth to misalignment, shuttling of the load. Friction of the teeth is
-added to the force of any model (`exugear.system.tooth_mesh.laws.friction`). `row_force` with
-`add_row_tangent` is the plain version, on unmodified coordinates. `add_row_mesh` is the version for loops over time, on
-the geometry that is optimised for speed (`exugear.system.kernels.meshes`). Tests check that they agree.
+Two ways lead from the coordinates to the readings and back: `pass_meshes`, also with derivatives, on unmodified
+coordinates, and `add_meshes` for loops over time, on the geometry that is optimised for speed
+(`exugear.system.kernels.meshes`). Tests check that they agree.
 """
 
 from __future__ import annotations
@@ -18,6 +18,16 @@ import numpy as np
 
 from exugear.system.kernels.coordinates import COSINE, PADDED, PADDED_SPIN, PADDED_TILT, SINE
 from exugear.system.kernels.meshes import (
+    ACTING,
+    ALONG,
+    ALONG_TURNING,
+    BEND,
+    BY_CENTRE,
+    BY_DELTA,
+    BY_PMC,
+    BY_Q,
+    BY_TILT,
+    BY_V,
     CYCLE_POWER,
     DAMPED_POWER,
     DEFLECTION,
@@ -25,54 +35,48 @@ from exugear.system.kernels.meshes import (
     ENERGY,
     FORCE,
     FORCE_ROW,
+    FORCES,
     FRAME,
-    LAST_CYCLE,
-    LAST_DAMPED,
-    LAST_DEFLECTION,
-    LAST_ENERGY,
-    LAST_FORCE,
-    LAST_OTHER,
-    LAST_OUTSIDE,
-    LAST_RATE,
+    GRADIENTS,
+    MEMORY,
     OTHER_POWER,
     OUTSIDE,
     PADDED_FRAME,
     PMC,
     RATE,
+    RATE_GRADIENTS,
+    RATE_SLOPES,
+    RATES,
+    READINGS,
     ROW_SIZE,
+    SECOND_SLOPES,
+    SLOPES,
     SPIN_1,
     SPIN_2,
+    STATE,
     STATE_SIZE,
     STIFFNESS,
-    TILT_ARM,
-    TILT_DAMPER,
+    STRAIGHT,
     TILT_DAMPING,
     TILT_LEVER,
     TILT_MOMENT,
-    TILT_PUSH,
-    TILT_RESISTANCE,
-    TILT_REST,
     TILT_STIFFNESS,
+    TURNINGS,
     MeshArrays,
     Meshes,
     MeshWork,
-    frame_row,
     load_way,
-    mesh_pmc,
     net_deflection,
     push_apart,
     rate_gradient,
-    relative_spin,
+    read_flank,
     row_dot,
     row_motion,
-    shuttling_at,
     subtract_errors,
     tilt_motion,
     turn_rows,
 )
 from exugear.system.kernels.table_law import (
-    NOMINAL_DEFLECTION,
-    NOMINAL_MISALIGNMENT,
     Scratch,
     TableArrays,
     scratch_memory,
@@ -81,19 +85,14 @@ from exugear.system.tooth_mesh.laws.friction import add_friction, add_friction_l
 from exugear.system.tooth_mesh.laws.line_of_action import CURVE_FORM, curve_law, stiffness_law
 from exugear.system.tooth_mesh.laws.table import (
     TABLE_FORM,
-    TABLE_MEMORY,
+    add_table_flank,
     add_table_mesh,
-    add_table_tangent,
-    table_force,
 )
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import kernel
 from fe_ste.tools.inner_kernels import bundle, cached_struct
 
-# Laws whose force depends on the deflection along a row and on the mesh cycle: both forms of their force
-
-ACTING, ACTING_TURNING, GRADIENT, TURNING, BEND, SLOPE, TILTING, TILT_TURNING, STILL, ROW_MEMORY = range(10)
-"""Rows of the memory of the plain form, (`ROW_MEMORY`, 13), and their number."""
+# Laws along a row: force by the deflection and the position in the mesh cycle
 
 
 @kernel
@@ -106,173 +105,228 @@ def row_law(
     return stiffness_law(coefficients, pieces, delta, pmc, cycling)
 
 
-# -- plain -----------------------------------------------------------------------------------------------------------
-
-
 @kernel
-def tilted(q: Floats, m: int, meshes: MeshArrays, memory: Floats) -> float:
-    """Misalignment of mesh m relative to that of its contact's state, rad; its gradient stays in `memory`.
+def row_flank(
+    m: int,
+    delta: float,
+    rate: float,
+    tilt: float,
+    tilt_rate: float,
+    pmc: float,
+    cycling: float,
+    meshes: MeshArrays | Meshes,
+) -> tuple[float, float, float, float, float, float, float, float, float]:
+    """Law along a row of mesh m with damper, resistance to misalignment and shuttling, by its readings and their rates.
 
-    Rows of the deflection stored there are replaced by those of e (`exugear.system.tooth_mesh.contact_state`).
+    The load bears at an axial place that shuttles, so that the teeth deflect by e = delta - (lever + way) tilt; the
+    damper stays at the lever. Teeth that do not resist misalignment have zeros in `MeshArrays.tilt`.
+
+    Returns
+    -------
+    force, moment : along deflection and misalignment, N and N m
+    energy, damped, cycle_power : J; W dissipated; W that the changing law gives to the rest
+    stiffness, by_pmc : slopes of the force by e and by pmc
+    arm, moment_by_pmc : lever + way (m); what the moment changes by pmc besides -arm times the force
     """
-    gradient = memory[GRADIENT]
-    turning = memory[TURNING]
-    tilting = memory[TILTING]
-    tilt_turning = memory[TILT_TURNING]
-    table = meshes.table
-    lever = meshes.tilt[m, TILT_LEVER]
-    tilt: float = table.nominal[m, NOMINAL_MISALIGNMENT] - meshes.tilt[m, TILT_REST]
-    tilt += frame_row(q, meshes.coordinates[m], meshes.axis[m], table.misalignment[m], tilting, tilt_turning)
-    for i in range(ROW_SIZE):
-        gradient[i] -= lever * tilting[i]
-        turning[i] -= lever * tilt_turning[i]
-    return tilt
-
-
-@kernel
-def row_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Floats, out: Floats, acting: Floats) -> None:
-    """Fill the state of a mesh with a law along a row, as in `mesh_state`, and its negative generalized force (13,)."""
-    gradient = memory[GRADIENT]
-    turning = memory[TURNING]
-    bend = memory[BEND]
-    tilting = memory[TILTING]
-    index = meshes.coordinates[m]
     resists = meshes.tilt[m]
-    # What deflects, and how fast.
-    delta = meshes.table.nominal[m, NOMINAL_DEFLECTION]
-    delta += net_deflection(q, m, meshes, meshes.deflection[m], 1.0, gradient, turning, bend)
-    rate = row_dot(index, gradient, v)
-    out[DEFLECTION], out[RATE] = delta, rate
-    moment = 0.0
-    turned = 0.0
-    stored = 0.0
-    lost = 0.0
-    if resists[TILT_STIFFNESS] > 0.0:
-        turned = tilted(q, m, meshes, memory)
-        tilt_rate = row_dot(index, tilting, v)
-        delta = delta - resists[TILT_LEVER] * turned
-        rate = rate - resists[TILT_LEVER] * tilt_rate
-        moment = resists[TILT_MOMENT] - resists[TILT_STIFFNESS] * turned - resists[TILT_DAMPING] * tilt_rate
-        stored = (0.5 * resists[TILT_STIFFNESS] * turned - resists[TILT_MOMENT]) * turned
-        lost = resists[TILT_DAMPING] * tilt_rate * tilt_rate
-    pmc = mesh_pmc(q, m, meshes)
-    cycling = meshes.cycles[m] * relative_spin(v, index, 0)
-    # The law, and its damper beside it, which stays where the load is in the mean.
+    lever = resists[TILT_LEVER]
     way, moving, beyond, changing = load_way(m, pmc, meshes)
-    elastic, k, _, energy, cycle_power = row_law(
-        meshes.form[m], meshes.stiffness[m], meshes.pieces[m], delta - way * turned, pmc, cycling
+    arm = lever + way
+    elastic, k, by_pmc, energy, cycle_power = row_law(
+        meshes.form[m], meshes.stiffness[m], meshes.pieces[m], delta - arm * tilt, pmc, cycling
     )
-    moment += way * elastic + beyond
-    stored -= beyond * turned
-    force = elastic + meshes.damping[m] * rate
-    # It acts along a row of its own, which for most laws is that of the deflection.
-    net_deflection(q, m, meshes, meshes.force[m], 1.0, acting, turning, bend)
-    if resists[TILT_STIFFNESS] > 0.0:
-        for i in range(ROW_SIZE):
-            acting[i] -= resists[TILT_LEVER] * tilting[i]
-    out[PMC], out[STIFFNESS] = pmc - math.floor(pmc), k
-    out[FORCE] = force * meshes.line_of_action[m]
-    out[ENERGY] = energy + stored
-    out[DAMPED_POWER] = meshes.damping[m] * rate * rate + lost
-    out[CYCLE_POWER] = cycle_power + (elastic * moving + changing) * turned * cycling
-    out[OTHER_POWER] = force * (row_dot(index, acting, v) - rate)
-    out[OUTSIDE] = 0.0
-    for i in range(ROW_SIZE):
-        acting[i] *= force
-    if resists[TILT_STIFFNESS] > 0.0:
-        for i in range(ROW_SIZE):
-            acting[i] -= moment * tilting[i]
+    approaching = rate - lever * tilt_rate
+    damped = meshes.damping[m] * approaching
+    lost = resists[TILT_DAMPING] * tilt_rate
+    push = resists[TILT_MOMENT] + beyond
+    moment = resists[TILT_STIFFNESS] * tilt + lost - push - arm * elastic - lever * damped
+    energy += (0.5 * resists[TILT_STIFFNESS] * tilt - push) * tilt
+    moment_by_pmc = -moving * elastic - changing
+    cycle_power -= moment_by_pmc * tilt * cycling
+    by_pmc -= k * moving * tilt
+    lost = damped * approaching + lost * tilt_rate
+    return elastic + damped, moment, energy, lost, cycle_power, k, by_pmc, arm, moment_by_pmc
 
 
 @kernel
-def add_row_tangent(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Floats, jq: Floats, jv: Floats) -> None:
-    """Add the derivatives of the negative force of a mesh with a law along a row, (13, 13)."""
-    gradient = memory[GRADIENT]
-    turning = memory[TURNING]
-    bend = memory[BEND]
-    slope = memory[SLOPE]
-    acting = memory[ACTING]
-    acting_turning = memory[ACTING_TURNING]
-    index = meshes.coordinates[m]
-    tilting = memory[TILTING]
-    tilt_turning = memory[TILT_TURNING]
-    resists = meshes.tilt[m]
-    delta = meshes.table.nominal[m, NOMINAL_DEFLECTION]
-    delta += net_deflection(q, m, meshes, meshes.deflection[m], 1.0, gradient, turning, bend)
-    pmc = mesh_pmc(q, m, meshes)
-    turned = 0.0
-    if resists[TILT_STIFFNESS] > 0.0:
-        turned = tilted(q, m, meshes, memory)
-        delta -= resists[TILT_LEVER] * turned
-        add_tilt_tangent(v, index, turned, resists, memory, jq, jv)
-    way, moving, beyond, changing = load_way(m, pmc, meshes)
-    elastic, k, by_pmc, _, _ = row_law(
-        meshes.form[m], meshes.stiffness[m], meshes.pieces[m], delta - way * turned, pmc, 0.0
-    )
-    by_pmc -= k * moving * turned
-    c = meshes.damping[m]
-    force = elastic + c * row_dot(index, gradient, v)
-    # Slope of the scalar force: of the damper's rate, of the deflection, and of pmc by both its angles.
-    rate_gradient(v, index, turning, bend, slope)
-    for i in range(ROW_SIZE):
-        slope[i] = c * slope[i] + k * gradient[i]
-    if meshes.way_pieces[m] > 0:
-        by_spin = (way * by_pmc + moving * elastic + changing) * meshes.cycles[m]
-        add_way_tangent(k * way, way, way * elastic + beyond, by_spin, memory, jq)
-    slope[SPIN_1] += by_pmc * meshes.cycles[m]
-    slope[FRAME] -= by_pmc * meshes.cycles[m]
-    # Product rule: the row times the force's slope, and the row's own turning times the force.
-    net_deflection(q, m, meshes, meshes.force[m], 1.0, acting, acting_turning, bend)
-    if resists[TILT_STIFFNESS] > 0.0:
-        for i in range(ROW_SIZE):
-            acting[i] -= resists[TILT_LEVER] * tilting[i]
-            acting_turning[i] -= resists[TILT_LEVER] * tilt_turning[i]
-    for i in range(ROW_SIZE):
-        for j in range(ROW_SIZE):
-            jq[i, j] += acting[i] * slope[j]
-            jv[i, j] += acting[i] * c * gradient[j]
-    turn_rows(acting_turning, bend, force, jq)
-
-
-@kernel
-def add_way_tangent(across: float, way: float, moment: float, by_spin: float, memory: Floats, jq: Floats) -> None:
-    """Add the derivatives of the moment of a shuttling load to the negative force, (13, 13).
-
-    The contribution of misalignment to the force's slope is stored in `memory`; `across` is the stiffness times the
-    shift (N), `by_spin` the slope of the moment (N m) by the spin of gear 1.
-    """
-    gradient = memory[GRADIENT]
-    tilting = memory[TILTING]
-    slope = memory[SLOPE]
-    straight = memory[STILL]
-    straight[:] = 0.0
-    for i in range(ROW_SIZE):
-        slope[i] -= across * tilting[i]
-        for j in range(ROW_SIZE):
-            jq[i, j] -= tilting[i] * across * (gradient[j] - way * tilting[j])
-        jq[i, SPIN_1] -= tilting[i] * by_spin
-        jq[i, FRAME] += tilting[i] * by_spin
-    turn_rows(memory[TILT_TURNING], straight, -moment, jq)
-
-
-@kernel
-def add_tilt_tangent(
-    v: Floats, index: Integers, turned: float, resists: Floats, memory: Floats, jq: Floats, jv: Floats
+def row_slopes(
+    m: int, k: float, by_pmc: float, arm: float, moment_by_pmc: float, meshes: MeshArrays, slopes: Floats, rates: Floats
 ) -> None:
-    """Add the derivatives of what the tilt stiffness and its damper give to the negative force, (13, 13)."""
-    tilting = memory[TILTING]
-    tilt_turning = memory[TILT_TURNING]
-    slope = memory[SLOPE]
-    straight = memory[STILL]
-    k = resists[TILT_STIFFNESS]
-    c = resists[TILT_DAMPING]
-    straight[:] = 0.0  # errors of wheels do not tilt
-    rate_gradient(v, index, tilt_turning, straight, slope)
+    """Fill the slopes (3, 4) of what `row_flank` gives by the readings, and those (3, 3) by their rates."""
+    resists = meshes.tilt[m]
+    c = meshes.damping[m]
+    lever = resists[TILT_LEVER]
+    slopes[BY_DELTA, BY_DELTA], slopes[BY_DELTA, BY_TILT], slopes[BY_DELTA, BY_PMC] = k, -arm * k, by_pmc
+    slopes[BY_TILT, BY_DELTA], slopes[BY_TILT, BY_TILT] = -arm * k, resists[TILT_STIFFNESS] + arm * arm * k
+    slopes[BY_TILT, BY_PMC] = moment_by_pmc - arm * by_pmc
+    rates[BY_DELTA, BY_DELTA], rates[BY_DELTA, BY_TILT] = c, -lever * c
+    rates[BY_TILT, BY_DELTA], rates[BY_TILT, BY_TILT] = -lever * c, resists[TILT_DAMPING] + lever * lever * c
+
+
+# Any law on unmodified coordinates: readings of a flank, and the chain rule back to the coordinates
+
+_NOTHING, _NO_ROWS = np.zeros(0), np.zeros((0, 0))
+"""No room for what `pass_meshes` fills."""
+
+
+@kernel
+def add_flank(
+    q: Floats,
+    v: Floats,
+    m: int,
+    side: int,
+    meshes: MeshArrays,
+    table: TableArrays | None,
+    law_memory: Scratch | None,
+    memory: Floats,
+    tangent: bool,
+) -> None:
+    """Add one flank (1, -1) of mesh m to its state and negative force, or to the derivatives of this: see `MEMORY`."""
+    is_table = meshes.form[m] == TABLE_FORM
+    # The table is that of the flank +1: the other one is seen from the other end of the gear.
+    read_flank(q, v, m, side, side * meshes.table.sense[m] if is_table else 1.0, meshes, memory)
+    readings, rates, forces = memory[READINGS], memory[RATES], memory[FORCES]
+    gradients = memory[GRADIENTS:TURNINGS]
+    slopes, rate_slopes = memory[SLOPES:RATE_SLOPES], memory[RATE_SLOPES:SECOND_SLOPES]
+    state = memory[STATE]
+    along = memory[ALONG]
+    slopes[:], rate_slopes[:], forces[:] = 0.0, 0.0, 0.0
+    if side > 0:
+        state[DEFLECTION] = readings[BY_DELTA]
+        state[RATE] = rates[BY_DELTA]
+        state[PMC] = readings[BY_PMC] - math.floor(readings[BY_PMC])
+    row = meshes.force[m]
+    if is_table:
+        if side < 0:
+            row = meshes.table.back[m]
+        add_table_flank(m, table, law_memory, memory, tangent)
+    else:
+        forces[BY_DELTA], forces[BY_TILT], energy, lost, cycle_power, k, by_pmc, arm, moment_by_pmc = row_flank(
+            m,
+            readings[BY_DELTA],
+            rates[BY_DELTA],
+            readings[BY_TILT],
+            rates[BY_TILT],
+            readings[BY_PMC],
+            rates[BY_PMC],
+            meshes,
+        )
+        row_slopes(m, k, by_pmc, arm, moment_by_pmc, meshes, slopes, rate_slopes)
+        state[STIFFNESS], state[ENERGY], state[DAMPED_POWER], state[CYCLE_POWER] = k, energy, lost, cycle_power
+    # The force acts along a row of its own, which for most laws is that of the deflection.
+    net_deflection(q, m, meshes, row, float(side), along, memory[ALONG_TURNING], memory[BEND])
+    index = meshes.coordinates[m]
+    state[FORCE] += side * forces[BY_DELTA] * meshes.line_of_action[m]
+    state[OTHER_POWER] += forces[BY_DELTA] * (row_dot(index, along, v) - rates[BY_DELTA])
     for i in range(ROW_SIZE):
+        memory[ACTING, i] += forces[BY_DELTA] * along[i]
+        memory[ACTING, i] += forces[BY_CENTRE] * gradients[BY_CENTRE, i] + forces[BY_TILT] * gradients[BY_TILT, i]
+    if tangent:
+        add_flank_tangent(v, index, memory)
+
+
+@kernel
+def add_flank_tangent(v: Floats, index: Integers, memory: Floats) -> None:
+    """Add the derivatives of the negative force of a flank, (13, 13) each, by the chain rule and the product rule."""
+    gradients, turnings = memory[GRADIENTS:TURNINGS], memory[TURNINGS:RATE_GRADIENTS]
+    rate_gradients = memory[RATE_GRADIENTS:SLOPES]
+    slopes, rate_slopes = memory[SLOPES:RATE_SLOPES], memory[RATE_SLOPES:SECOND_SLOPES]
+    bend, straight, along = memory[BEND], memory[STRAIGHT], memory[ALONG]
+    jq = memory[BY_Q:BY_V]
+    jv = memory[BY_V:MEMORY]
+    straight[:] = 0.0  # errors of wheels neither move axes nor tilt them
+    rate_gradient(v, index, turnings[BY_DELTA], bend, rate_gradients[BY_DELTA])
+    rate_gradient(v, index, turnings[BY_CENTRE], straight, rate_gradients[BY_CENTRE])
+    rate_gradient(v, index, turnings[BY_TILT], straight, rate_gradients[BY_TILT])
+    for a in range(3):
+        row = along if a == BY_DELTA else gradients[a]
         for j in range(ROW_SIZE):
-            jq[i, j] += tilting[i] * (k * tilting[j] + c * slope[j])
-            jv[i, j] += tilting[i] * c * tilting[j]
-    turn_rows(tilt_turning, straight, k * turned + c * row_dot(index, tilting, v) - resists[TILT_MOMENT], jq)
+            slope, rate_slope = slopes[a, BY_PMC] * gradients[BY_PMC, j], 0.0
+            for b in range(3):
+                slope += slopes[a, b] * gradients[b, j] + rate_slopes[a, b] * rate_gradients[b, j]
+                rate_slope += rate_slopes[a, b] * gradients[b, j]
+            for i in range(ROW_SIZE):
+                jq[i, j] += row[i] * slope
+                jv[i, j] += row[i] * rate_slope
+    # The rows turn with the frame.
+    turn_rows(memory[ALONG_TURNING], bend, memory[FORCES, BY_DELTA], jq)
+    turn_rows(turnings[BY_CENTRE], straight, memory[FORCES, BY_CENTRE], jq)
+    turn_rows(turnings[BY_TILT], straight, memory[FORCES, BY_TILT], jq)
+
+
+@kernel
+def pass_meshes(
+    q: Floats,
+    v: Floats,
+    meshes: MeshArrays,
+    table: TableArrays | None,
+    states: Floats,
+    f: Floats,
+    jq: Floats,
+    jv: Floats,
+    memory: Floats,
+    law_memory: Scratch | None,
+) -> None:
+    """Fill states (m, 11), add forces to f, or derivatives to jq and jv, of all meshes, where there is room for them.
+
+    One function does all, so that the models are compiled once. `table` is that of `acting_table`, including the memory
+    of its model; `memory` is (`MEMORY`, 13).
+    """
+    state = memory[STATE]
+    acting = memory[ACTING]
+    tangent = jq.size > 0
+    for m in range(meshes.coordinates.shape[0]):
+        index = meshes.coordinates[m]
+        state[:] = 0.0
+        acting[:] = 0.0
+        if tangent:
+            memory[BY_Q:MEMORY] = 0.0
+        add_flank(q, v, m, 1, meshes, table, law_memory, memory, tangent)
+        if meshes.form[m] == TABLE_FORM:
+            add_flank(q, v, m, -1, meshes, table, law_memory, memory, tangent)
+        add_friction(q, v, m, meshes, memory[ALONG], memory[ALONG_TURNING], state, acting)
+        for i in range(STATE_SIZE if states.size > 0 else 0):
+            states[m, i] = state[i]
+        for i in range(ROW_SIZE):
+            if index[i] >= 0 and f.size > 0:
+                f[index[i]] -= acting[i]
+            for j in range(ROW_SIZE if tangent else 0):
+                if index[i] >= 0 and index[j] >= 0:
+                    jq[index[i], index[j]] -= memory[BY_Q + i, j]
+                    jv[index[i], index[j]] -= memory[BY_V + i, j]
+
+
+def acting_table(meshes: MeshArrays) -> TableArrays | None:
+    """Tables of meshes, None if none of them follows one: nothing of their law is compiled then."""
+    if (meshes.form == TABLE_FORM).any():
+        return meshes.table
+    return None
+
+
+def _bundles(meshes: MeshArrays) -> tuple[MeshArrays, TableArrays | None]:
+    table = acting_table(meshes)
+    return cached_struct(meshes), None if table is None else cached_struct(table)
+
+
+def _pass(q: Floats, v: Floats, meshes: MeshArrays, states: Floats, f: Floats, jq: Floats, jv: Floats) -> None:
+    bundled, table = _bundles(meshes)
+    law_memory = None if table is None else bundle(scratch_memory())
+    pass_meshes(q, v, bundled, table, states, f, jq, jv, np.empty((MEMORY, ROW_SIZE)), law_memory)
+
+
+def add_mesh_forces(q: Floats, v: Floats, meshes: MeshArrays, f: Floats) -> None:
+    """Add the generalized forces of all meshes to f, shape of q."""
+    _pass(q, v, meshes, _NO_ROWS, f, _NO_ROWS, _NO_ROWS)
+
+
+def add_mesh_jacobian(q: Floats, v: Floats, meshes: MeshArrays, jq: Floats, jv: Floats) -> None:
+    """Add d f/dq and d f/dv of `add_mesh_forces` to jq and jv, each (n, n)."""
+    _pass(q, v, meshes, _NO_ROWS, _NOTHING, jq, jv)
+
+
+def mesh_state(q: Floats, v: Floats, meshes: MeshArrays, out: Floats) -> None:
+    """Fill (m, 11): what each mesh does; columns as named in `exugear.system.kernels.meshes`."""
+    _pass(q, v, meshes, out, _NOTHING, _NO_ROWS, _NO_ROWS)
 
 
 # -- arranged for speed ----------------------------------------------------------------------------------------------
@@ -343,9 +397,10 @@ def keep_state(
     state: Floats,
 ) -> None:
     """Leave what a mesh with a law along a row does: see `exugear.system.kernels.meshes`."""
-    state[LAST_DEFLECTION], state[LAST_RATE], state[LAST_OUTSIDE], state[LAST_FORCE] = delta, rate, 0.0, force
-    state[LAST_ENERGY], state[LAST_DAMPED] = energy, meshes.damping[m] * rate * rate
-    state[LAST_CYCLE], state[LAST_OTHER] = cycle_power, force * (acting - rate)
+    state[DEFLECTION], state[RATE], state[OUTSIDE] = delta, rate, 0.0
+    state[FORCE] = force * meshes.line_of_action[m]
+    state[ENERGY], state[DAMPED_POWER] = energy, meshes.damping[m] * rate * rate
+    state[CYCLE_POWER], state[OTHER_POWER] = cycle_power, force * (acting - rate)
 
 
 @kernel
@@ -385,136 +440,22 @@ def add_tilting_mesh(
 ) -> None:
     """Add force and moment of a mesh that resists misalignment; the gradient of its deflection is known."""
     frame = meshes.coordinates[m, FRAME]
-    resists = meshes.tilt[m]
     state = work.mesh.states[m]
-    turned, tilt_rate, x, y, turning = tilt_motion(m, v[frame], c, s, meshes, work.places)
-    arm = resists[TILT_ARM]
-    stiffness = resists[TILT_RESISTANCE]
-    lost = resists[TILT_DAMPER] * tilt_rate
-    way = 0.0
-    moving = 0.0
-    beyond = 0.0
-    changing = 0.0
-    cycling = 0.0
-    if meshes.way_pieces[m] > 0:
-        pmc, cycling = mesh_cycle(q, v, m, meshes)
-        way, moving, beyond, changing = shuttling_at(meshes.way[m], meshes.way_pieces[m], pmc)
-    # Where the load bears beside the middle of the face, it deflects with the misalignment.
-    approach = delta - arm * turned
-    approaching = rate - arm * tilt_rate
-    elastic, _, _, energy, cycle_power = elastic_mesh_force(q, v, m, approach - way * turned, meshes)
-    cycle_power += (elastic * moving + changing) * cycling * turned
-    force = elastic + meshes.damping[m] * approaching
+    tilt, tilt_rate, x, y, turning = tilt_motion(m, v[frame], c, s, meshes, work.places)
+    pmc, cycling = mesh_cycle(q, v, m, meshes)
+    force, moment, energy, lost, cycle_power, _, _, _, _ = row_flank(
+        m, delta, rate, tilt, tilt_rate, pmc, cycling, meshes
+    )
     push_apart(m, force, work.mesh.gradients[DEFLECTION_ROW], meshes, work)
-    moment = resists[TILT_PUSH] - stiffness * turned - lost + arm * force + way * elastic + beyond
     first = work.loads[meshes.ends[m, 0]]
     second = work.loads[meshes.ends[m, 1]]
-    first[PADDED_TILT] += moment * x
-    first[PADDED_TILT + 1] += moment * y
-    second[PADDED_TILT] -= moment * x
-    second[PADDED_TILT + 1] -= moment * y
-    work.force[frame] += moment * turning
-    keep_state(m, delta, approaching, approaching, force, energy, cycle_power, meshes, state)
-    state[LAST_RATE] = rate
-    state[LAST_ENERGY] += (0.5 * stiffness * turned - resists[TILT_PUSH] - beyond) * turned
-    state[LAST_DAMPED] += lost * tilt_rate
-
-
-# Forces of all meshes in one pass, each by the form that its law has: plain, and in loops over time
-
-STATE = ROW_MEMORY
-BY_Q = STATE + 1
-BY_V = BY_Q + ROW_SIZE
-OF_TABLE = BY_Q + 2 * ROW_SIZE
-MEMORY = OF_TABLE + TABLE_MEMORY
-"""Rows of the memory of `pass_meshes`, (`MEMORY`, 13): vectors of a mesh, and derivatives of its force."""
-_NOTHING, _NO_ROWS = np.zeros(0), np.zeros((0, 0))
-"""No room for what `pass_meshes` fills."""
-
-
-@kernel
-def pass_meshes(
-    q: Floats,
-    v: Floats,
-    meshes: MeshArrays,
-    table: TableArrays | None,
-    states: Floats,
-    f: Floats,
-    jq: Floats,
-    jv: Floats,
-    memory: Floats,
-    law_memory: Scratch | None,
-) -> None:
-    """Apply the functions below to all meshes, with the memory provided.
-
-    One function does all, so that the models are compiled once. `table` is that of `acting_table`, including the memory
-    of its model; `memory` is (`MEMORY`, 13).
-    """
-    state = memory[STATE]
-    acting = memory[ACTING]
-    local_q = memory[BY_Q:BY_V]
-    local_v = memory[BY_V:OF_TABLE]
-    of_table = memory[OF_TABLE:]
-    for m in range(meshes.coordinates.shape[0]):
-        index = meshes.coordinates[m]
-        if f.size > 0 or states.size > 0:
-            if meshes.form[m] == TABLE_FORM:
-                table_force(q, v, m, meshes, table, of_table, law_memory, state, acting)
-            else:
-                row_force(q, v, m, meshes, memory, state, acting)
-            add_friction(q, v, m, meshes, memory[GRADIENT], memory[TURNING], state, acting)
-            for i in range(STATE_SIZE if states.size > 0 else 0):
-                states[m, i] = state[i]
-            for i in range(ROW_SIZE):
-                if f.size > 0 and index[i] >= 0:
-                    f[index[i]] -= acting[i]
-        if jq.size > 0:
-            for i in range(ROW_SIZE):
-                for j in range(ROW_SIZE):
-                    local_q[i, j], local_v[i, j] = 0.0, 0.0
-            if meshes.form[m] == TABLE_FORM:
-                for side in (1, -1):
-                    add_table_tangent(q, v, m, side, meshes, table, of_table, law_memory, local_q, local_v)
-            else:
-                add_row_tangent(q, v, m, meshes, memory, local_q, local_v)
-            for i in range(ROW_SIZE):
-                for j in range(ROW_SIZE):
-                    if index[i] >= 0 and index[j] >= 0:
-                        jq[index[i], index[j]] -= local_q[i, j]
-                        jv[index[i], index[j]] -= local_v[i, j]
-
-
-def acting_table(meshes: MeshArrays) -> TableArrays | None:
-    """Tables of meshes, None if none of them follows one: nothing of their law is compiled then."""
-    if (meshes.form == TABLE_FORM).any():
-        return meshes.table
-    return None
-
-
-def _bundles(meshes: MeshArrays) -> tuple[MeshArrays, TableArrays | None]:
-    table = acting_table(meshes)
-    return cached_struct(meshes), None if table is None else cached_struct(table)
-
-
-def _pass(q: Floats, v: Floats, meshes: MeshArrays, states: Floats, f: Floats, jq: Floats, jv: Floats) -> None:
-    bundled, table = _bundles(meshes)
-    law_memory = None if table is None else bundle(scratch_memory())
-    pass_meshes(q, v, bundled, table, states, f, jq, jv, np.empty((MEMORY, ROW_SIZE)), law_memory)
-
-
-def add_mesh_forces(q: Floats, v: Floats, meshes: MeshArrays, f: Floats) -> None:
-    """Add the generalized forces of all meshes to f, shape of q."""
-    _pass(q, v, meshes, _NO_ROWS, f, _NO_ROWS, _NO_ROWS)
-
-
-def add_mesh_jacobian(q: Floats, v: Floats, meshes: MeshArrays, jq: Floats, jv: Floats) -> None:
-    """Add d f/dq and d f/dv of `add_mesh_forces` to jq and jv, each (n, n)."""
-    _pass(q, v, meshes, _NO_ROWS, _NOTHING, jq, jv)
-
-
-def mesh_state(q: Floats, v: Floats, meshes: MeshArrays, out: Floats) -> None:
-    """Fill (m, 11): what each mesh does; columns as named in `exugear.system.kernels.meshes`."""
-    _pass(q, v, meshes, out, _NOTHING, _NO_ROWS, _NO_ROWS)
+    first[PADDED_TILT] -= moment * x
+    first[PADDED_TILT + 1] -= moment * y
+    second[PADDED_TILT] += moment * x
+    second[PADDED_TILT + 1] += moment * y
+    work.force[frame] -= moment * turning
+    keep_state(m, delta, rate, rate, force, energy, cycle_power, meshes, state)
+    state[DAMPED_POWER] = lost
 
 
 @kernel

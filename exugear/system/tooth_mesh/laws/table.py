@@ -26,43 +26,40 @@ from exugear.system.kernels.coordinates import BODY_SIZE, COSINE, SINE, SPIN
 from exugear.system.kernels.meshes import (
     ALONG_DEFLECTION,
     ALONG_FORCE,
+    BY_CENTRE,
+    BY_DELTA,
+    BY_PMC,
+    BY_Q,
+    BY_TILT,
+    CENTRE_CHANGE,
+    CENTRE_RATE,
     CYCLE_POWER,
     DAMPED_POWER,
+    DAMPING,
     DEFLECTION,
     ENERGY,
     FORCE,
+    FORCES,
     FRAME,
-    LAST_CENTRE,
-    LAST_CENTRE_RATE,
-    LAST_CYCLE,
-    LAST_DAMPED,
-    LAST_DEFLECTION,
-    LAST_ENERGY,
-    LAST_FORCE,
-    LAST_MISALIGNMENT,
-    LAST_OUTSIDE,
-    LAST_RATE,
+    MISALIGNMENT,
     OUTSIDE,
-    PMC,
     RATE,
+    RATE_SLOPES,
+    RATES,
+    READINGS,
     ROW_SIZE,
+    SECOND_SLOPES,
+    SLOPES,
     SPIN_1,
     SPIN_2,
+    STATE,
     STIFFNESS,
     TABLE_FORCE,
-    MeshArrays,
     Meshes,
     MeshMemory,
     MeshWork,
-    frame_row,
-    mesh_pmc,
     mesh_row,
-    net_deflection,
-    rate_gradient,
-    relative_spin,
-    row_dot,
     subtract_errors,
-    turn_rows,
 )
 from exugear.system.kernels.table_law import (
     BY_DISTANCE,
@@ -105,10 +102,6 @@ from fe_ste.transmission_error.surface import InterpolationError, SteSurface, ax
 from fe_ste.transmission_error.table import TableError
 
 TABLE_FORM = 1
-GRADIENT, TURNING, BEND, CHANGING, PUSH, DAMPING, RATES = range(7)
-GRADIENTS, SLOPES, SECOND, BY_ARGUMENTS = RATES + 3, RATES + 7, RATES + 11, RATES + 15
-BY_RATES, TABLE_MEMORY = BY_ARGUMENTS + 3, BY_ARGUMENTS + 6
-"""Rows of the memory of `table_force` and `add_table_tangent`, (`TABLE_MEMORY`, 13)."""
 
 
 class Table(Law):
@@ -153,26 +146,6 @@ def _surface_of(mesh: Mesh, data: MeshData) -> SteSurface:
     if not isinstance(data, SteSurface):
         raise MeshError(f"pair {mesh.pair.name}: the mesh model table requires a table, not a stiffness")
     return data
-
-
-@kernel
-def flank_of(side: int, m: int, meshes: MeshArrays, table: TableArrays) -> tuple[Floats, Floats, float, float, float]:
-    """Rows of deflection and misalignment, deflection at zero coordinates, phase and cycles of one flank (1, -1)."""
-    deflection = table.nominal[m, NOMINAL_DEFLECTION]
-    if side > 0:
-        return meshes.deflection[m], table.misalignment[m], deflection, meshes.phase[m], meshes.cycles[m]
-    # The other flank closes when the loaded one opens by the backlash, and its cycle runs the other way.
-    offset = -deflection - table.backlash[m]
-    return table.back[m], table.back_misalignment[m], offset, table.back_phase[m], -meshes.cycles[m]
-
-
-@kernel
-def position_by(
-    q: Floats, m: int, meshes: MeshArrays, row: Floats, nominal: float, gradient: Floats, changing: Floats
-) -> float:
-    """Centre distance (m) or misalignment (rad) of mesh m by its row, whose gradient and change stay behind."""
-    value: float = nominal + frame_row(q, meshes.coordinates[m], meshes.axis[m], row, gradient, changing)
-    return value
 
 
 @kernel
@@ -224,143 +197,93 @@ def flank_tangent(
 
 
 @kernel
-def table_force(
-    q: Floats,
-    v: Floats,
+def table_flank(
     m: int,
-    meshes: MeshArrays,
-    table: TableArrays | None,
-    rows: Floats,
-    law_memory: Scratch | None,
-    out: Floats,
-    acting: Floats,
+    delta: float,
+    rate: float,
+    centre: float,
+    centre_rate: float,
+    tilt: float,
+    tilt_rate: float,
+    pmc: float,
+    guess: int,
+    wanted: int,
+    table: TableArrays,
+    law_memory: Scratch,
+    damping: Floats,
+) -> tuple[int, float, float, float, float, float, float]:
+    """Law of one flank of mesh m by its readings, in the axes of the table; `law_memory` and `damping` are left filled.
+
+    Returns
+    -------
+    piece, t : as of `surface_law`
+    force, along_centre, along_tilt : along deflection and centre distance (N), and along misalignment (N m)
+    damped, lost : damping along the deflection, N; its power, W
+    """
+    piece, t = surface_law(delta, pmc, centre, tilt, m, table, guess, wanted, law_memory)
+    law = law_memory.law
+    # Gears that stay where they are damp along the deflection alone.
+    if wanted < DAMPING_DERIVATIVES:
+        damping[:] = 0.0
+    else:
+        surface_damping(t, piece, m, table, law_memory, damping)
+    damped, centre_damped, tilt_damped, lost = damped_forces(
+        table.damping_time[m], law[LAW_STIFFNESS], damping, rate, centre_rate, tilt_rate
+    )
+    along_centre, along_tilt = law[LAW_BY_DISTANCE] + centre_damped, law[LAW_BY_MISALIGNMENT] + tilt_damped
+    return piece, t, law[LAW_FORCE] + damped, along_centre, along_tilt, damped, lost
+
+
+@kernel
+def add_table_flank(
+    m: int, table: TableArrays | None, law_memory: Scratch | None, memory: Floats, tangent: bool
 ) -> None:
-    """Fill the state of a mesh with a table, as in `mesh_state`, and its generalized force, negative (13,).
+    """Fill what a flank gives along its readings, and its slopes if wanted; add to the state of the mesh: see `MEMORY`.
 
     `table` is None in a system without tables: nothing of their law is compiled then.
     """
     if table is None or law_memory is None:
         return
-    gradient, turning, bend, changing, push = rows[GRADIENT], rows[TURNING], rows[BEND], rows[CHANGING], rows[PUSH]
-    index, damping = meshes.coordinates[m], rows[DAMPING]
-    centre = position_by(q, m, meshes, table.centre[m], table.nominal[m, NOMINAL_DISTANCE], gradient, changing)
-    centre_rate = row_dot(index, gradient, v)
-    spin, cycling = relative_spin(q, index, 0), relative_spin(v, index, 0)
-    pmc = mesh_pmc(q, m, meshes)
-    out[:] = 0.0
-    acting[:] = 0.0
-    out[PMC] = pmc - math.floor(pmc)
-    for side in (1, -1):
-        row, misalignment_row, offset, phase, cycles = flank_of(side, m, meshes, table)
-        delta = offset + net_deflection(q, m, meshes, row, float(side), gradient, turning, bend)
-        rate = row_dot(index, gradient, v)
-        if side > 0:
-            out[DEFLECTION], out[RATE] = delta, rate
-        # Most of the time one flank is far away: nothing of its table needs to be read.
-        if delta <= table.lowest[m]:
-            continue
-        # The table is that of the flank +1: on the other one it is seen from the other end of the gear.
-        sense = side * table.sense[m]
-        nominal = table.nominal[m, NOMINAL_MISALIGNMENT]
-        misalignment = sense * position_by(q, m, meshes, misalignment_row, nominal, push, changing)
-        tilt_rate = sense * row_dot(index, push, v)
-        pmc = phase + cycles * spin
-        piece, t = surface_law(delta, pmc, centre, misalignment, m, table, 0, DAMPING_DERIVATIVES, law_memory)
-        law = law_memory.law
-        surface_damping(t, piece, m, table, law_memory, damping)
-        damped, along_centre, along_tilt, lost = damped_forces(
-            table.damping_time[m], law[LAW_STIFFNESS], damping, rate, centre_rate, tilt_rate
-        )
-        force = law[LAW_FORCE] + damped
-        for i in range(ROW_SIZE):
-            acting[i] += force * gradient[i]
-        # Push between the axes and moment of misalignment, as one row.
-        apart, moment = law[LAW_BY_DISTANCE] + along_centre, sense * (law[LAW_BY_MISALIGNMENT] + along_tilt)
-        for i in range(FRAME):
-            push[i] = apart * table.centre[m, i] + moment * misalignment_row[i]
-        frame_row(q, index, meshes.axis[m], push, gradient, turning)
-        for i in range(ROW_SIZE):
-            acting[i] += gradient[i]
-        out[STIFFNESS] += law[LAW_STIFFNESS]
-        out[FORCE] += side * force
-        out[ENERGY] += law[LAW_POTENTIAL]
-        out[DAMPED_POWER] += lost
-        out[CYCLE_POWER] -= law[LAW_BY_PMC] * cycles * cycling
-        out[OUTSIDE] = max(out[OUTSIDE], law[LAW_OUTSIDE])
-
-
-@kernel
-def add_table_tangent(
-    q: Floats,
-    v: Floats,
-    m: int,
-    side: int,
-    meshes: MeshArrays,
-    table: TableArrays | None,
-    rows: Floats,
-    law_memory: Scratch | None,
-    jq: Floats,
-    jv: Floats,
-) -> None:
-    """Add the derivatives of the negative force of one flank of a mesh with a table, (13, 13); None as there."""
-    if table is None or law_memory is None:
-        return
-    index, axis = meshes.coordinates[m], meshes.axis[m]
-    row, misalignment_row, offset, phase, cycles = flank_of(side, m, meshes, table)
-    # Gradients of the four arguments of the law: delta, centre distance, misalignment, pmc.
-    gradients, slopes, second = rows[GRADIENTS:SLOPES], rows[SLOPES:SECOND], rows[SECOND:TABLE_MEMORY]
-    turning, bend, changing, tilting = rows[TURNING], rows[BEND], rows[CHANGING], rows[PUSH]
-    rates, damping = rows[RATES:GRADIENTS], rows[DAMPING]
-    by_arguments, by_rates = rows[BY_ARGUMENTS:BY_RATES], rows[BY_RATES:TABLE_MEMORY]
-    delta = offset + net_deflection(q, m, meshes, row, float(side), gradients[0], turning, bend)
-    if delta <= table.lowest[m]:
-        return
-    rate_gradient(v, index, turning, bend, rates[0])
-    centre = table.nominal[m, NOMINAL_DISTANCE] + frame_row(q, index, axis, table.centre[m], gradients[1], changing)
-    damping[:] = 0.0  # errors of wheels neither move axes nor tilt them
-    rate_gradient(v, index, changing, damping, rates[1])
-    sense = side * table.sense[m]
-    for i in range(FRAME):
-        tilting[i] = sense * misalignment_row[i]
-    misalignment = sense * table.nominal[m, NOMINAL_MISALIGNMENT]
-    misalignment += frame_row(q, index, axis, tilting, gradients[2], changing)
-    rate_gradient(v, index, changing, damping, rates[2])
-    pmc = phase + cycles * relative_spin(q, index, 0)
-    gradients[3, :] = 0.0
-    gradients[3, SPIN_1], gradients[3, FRAME] = cycles, -cycles
-    piece, t = surface_law(delta, pmc, centre, misalignment, m, table, 0, ORDERS.shape[0], law_memory)
-    if t < 0.0:
-        return
-    surface_tangent(t, piece, m, table, law_memory, second)
-    surface_damping(t, piece, m, table, law_memory, damping)
-    law, time = law_memory.law, table.damping_time[m]
-    rate, centre_rate = row_dot(index, gradients[0], v), row_dot(index, gradients[1], v)
-    damped, along_centre, along_tilt, _ = damped_forces(
-        time, law[LAW_STIFFNESS], damping, rate, centre_rate, row_dot(index, gradients[2], v)
+    readings, rates, forces, damping, state = (
+        memory[READINGS],
+        memory[RATES],
+        memory[FORCES],
+        memory[DAMPING],
+        memory[STATE],
     )
-    flank_tangent(time, law[LAW_STIFFNESS], damped, damping, second, by_arguments, by_rates)
-    # Slopes of F, U_a and U_gamma over the coordinates, by the chain rule.
-    for i in range(ROW_SIZE):
-        for a in range(3):
-            slopes[a, i] = 0.0
-            for b in range(4):
-                slopes[a, i] += by_arguments[a, b] * gradients[b, i]
-            for b in range(3):
-                slopes[a, i] += by_rates[a, b] * rates[b, i]
-                for j in range(ROW_SIZE):
-                    jv[i, j] += by_rates[a, b] * gradients[a, i] * gradients[b, j]
-    for a in range(3):
-        for i in range(ROW_SIZE):
-            for j in range(ROW_SIZE):
-                jq[i, j] += gradients[a, i] * slopes[a, j]
-    # The rows turn with the frame: second derivatives of all three times what acts along them.
-    turn_rows(turning, bend, law[LAW_FORCE] + damped, jq)
-    bend[:] = 0.0
-    apart, moment = law[LAW_BY_DISTANCE] + along_centre, law[LAW_BY_MISALIGNMENT] + along_tilt
-    for i in range(FRAME):
-        tilting[i] = apart * table.centre[m, i] + moment * tilting[i]
-    frame_row(q, index, axis, tilting, gradients[0], turning)
-    turn_rows(turning, bend, 1.0, jq)
+    # Most of the time one flank is far away: nothing of its table needs to be read.
+    if readings[BY_DELTA] <= table.lowest[m]:
+        return
+    wanted = ORDERS.shape[0] if tangent else DAMPING_DERIVATIVES
+    piece, t, forces[BY_DELTA], forces[BY_CENTRE], forces[BY_TILT], damped, lost = table_flank(
+        m,
+        readings[BY_DELTA],
+        rates[BY_DELTA],
+        readings[BY_CENTRE],
+        rates[BY_CENTRE],
+        readings[BY_TILT],
+        rates[BY_TILT],
+        readings[BY_PMC],
+        0,
+        wanted,
+        table,
+        law_memory,
+        damping,
+    )
+    law = law_memory.law
+    state[STIFFNESS] += law[LAW_STIFFNESS]
+    state[ENERGY] += law[LAW_POTENTIAL]
+    state[DAMPED_POWER] += lost
+    state[CYCLE_POWER] -= law[LAW_BY_PMC] * rates[BY_PMC]
+    state[OUTSIDE] = max(state[OUTSIDE], law[LAW_OUTSIDE])
+    if tangent and t >= 0.0:
+        second, slopes, rate_slopes = (
+            memory[SECOND_SLOPES:BY_Q],
+            memory[SLOPES:RATE_SLOPES],
+            memory[RATE_SLOPES:SECOND_SLOPES],
+        )
+        surface_tangent(t, piece, m, table, law_memory, second)
+        flank_tangent(table.damping_time[m], law[LAW_STIFFNESS], damped, damping, second, slopes, rate_slopes)
 
 
 @kernel
@@ -401,41 +324,44 @@ def fast_flank_force(
         tilt, tilt_rate = mesh_row(q, v, index, axis, misalignment_row, c, s, memory.gradient[ALONG_FORCE])
         misalignment += tilt
     if side > 0:
-        state[LAST_DEFLECTION], state[LAST_RATE], state[LAST_MISALIGNMENT] = delta, rate, misalignment
+        state[DEFLECTION], state[RATE], state[MISALIGNMENT] = delta, rate, misalignment
     if delta <= table.lowest[m]:
         return
     sense = side * table.sense[m]
     pmc = phase + cycles * (q[index[SPIN_1]] - q[index[FRAME]])
-    centre = table.nominal[m, NOMINAL_DISTANCE] + state[LAST_CENTRE]
+    centre = table.nominal[m, NOMINAL_DISTANCE] + state[CENTRE_CHANGE]
     # From step to step the load stays on a piece: the search begins where it ended.
-    guess = memory.pieces[m, number]
     wanted = ENERGY_DERIVATIVES if spinning else DAMPING_DERIVATIVES
-    piece, t = surface_law(delta, pmc, centre, sense * misalignment, m, table, guess, wanted, law_memory)
-    memory.pieces[m, number] = piece
-    law, damping = law_memory.law, memory.damping
-    # Gears that stay where they are damp along the deflection alone.
-    if spinning:
-        damping[:] = 0.0
-    else:
-        surface_damping(t, piece, m, table, law_memory, damping)
-    damped, along_centre, along_tilt, lost = damped_forces(
-        table.damping_time[m], law[LAW_STIFFNESS], damping, rate, state[LAST_CENTRE_RATE], sense * tilt_rate
+    memory.pieces[m, number], _, force, apart, along_tilt, _, lost = table_flank(
+        m,
+        delta,
+        rate,
+        centre,
+        state[CENTRE_RATE],
+        sense * misalignment,
+        sense * tilt_rate,
+        pmc,
+        memory.pieces[m, number],
+        wanted,
+        table,
+        law_memory,
+        memory.damping,
     )
-    force = law[LAW_FORCE] + damped
+    law = law_memory.law
     for i in range(ROW_SIZE):
         total[i] += force * gradient[i]
     if not spinning:
-        apart, moment = law[LAW_BY_DISTANCE] + along_centre, sense * (law[LAW_BY_MISALIGNMENT] + along_tilt)
+        moment = sense * along_tilt
         for i in range(FRAME):
             memory.row[i] = apart * table.centre[m, i] + moment * misalignment_row[i]
         mesh_row(q, v, index, axis, memory.row, c, s, memory.gradient[ALONG_FORCE])
         for i in range(ROW_SIZE):
             total[i] += memory.gradient[ALONG_FORCE, i]
-    state[LAST_FORCE] += side * force
-    state[LAST_OUTSIDE] = max(state[LAST_OUTSIDE], law[LAW_OUTSIDE])
-    state[LAST_ENERGY] += law[LAW_POTENTIAL]
-    state[LAST_DAMPED] += lost
-    state[LAST_CYCLE] -= law[LAW_BY_PMC] * cycles * (v[index[SPIN_1]] - v[index[FRAME]])
+    state[FORCE] += side * force
+    state[OUTSIDE] = max(state[OUTSIDE], law[LAW_OUTSIDE])
+    state[ENERGY] += law[LAW_POTENTIAL]
+    state[DAMPED_POWER] += lost
+    state[CYCLE_POWER] -= law[LAW_BY_PMC] * cycles * (v[index[SPIN_1]] - v[index[FRAME]])
 
 
 @kernel
@@ -459,7 +385,7 @@ def fast_table_force(
     if meshes.spinning[m] == 0:
         index, gradient = meshes.coordinates[m], memory.gradient[ALONG_FORCE]
         centre, rate = mesh_row(q, v, index, meshes.axis[m], table.centre[m], c, s, gradient)
-        memory.states[m, LAST_CENTRE], memory.states[m, LAST_CENTRE_RATE] = centre, rate
+        memory.states[m, CENTRE_CHANGE], memory.states[m, CENTRE_RATE] = centre, rate
     for side in (1, -1):
         fast_flank_force(q, v, m, side, meshes, table, c, s, law_memory, memory)
 
