@@ -91,9 +91,11 @@ def short_section(material: ReportData) -> Part:
     found = headline.envelopes(material.lines)
     curves = {name: found[name] for name in _sorted_quantities(headline, top) if name in found}
     drawn = curves
+    caption = "largest single order"
     if headline.response is not None:
         dynamic = envelopes(headline.response, headline.ranking.speeds)
         drawn = {name: dynamic[name] for name in curves}
+        caption = "largest order, quasi-static ones omitted"
     answer: dict[str, Any] = {
         "scope": _scope(material, headline),
         "kicker": _kicker(headline),
@@ -104,7 +106,7 @@ def short_section(material: ReportData) -> Part:
         "quantities": [_quantity(material, headline, top, name) for name in _sorted_quantities(headline, top)],
         "note": _note(material, headline),
         "strips": [_strips(material, headline, drawn, size) for size in STRIPS if drawn],
-        "drawn": "largest order, quasi-static ones omitted" if headline.response is not None else "largest single order",
+        "drawn": caption,
         "resonance": _resonance_box(material, headline, mode),
         "cause": _cause_box(material, top, known),
         "remedy": _remedy_box(material, headline),
