@@ -146,15 +146,33 @@ def _variant(material: ReportData, group: RunGroup, run: VariantRun) -> dict[str
         "constant": _constant(material, group.constant.get(run.variant)),
         "resonances": [_resonance(material, group, run, own) for own in group.ranked[run.variant]],
         "first": _first(group, run.variant),
+        "leading": _leading(material, group, run.variant),
     }
 
 
 def _first(group: RunGroup, variant: str) -> int:
-    """Return the place of the resonance that is chosen first: that of the ranking, or else the highest steady one."""
+    """Return the place of the resonance that is chosen first: that of the ranking, or else the highest steady one.
+
+    It is -1 where the first resonance of the ranking is no peak of the transmission error.
+    """
     ranked = group.ranked[variant]
+    if variant == group.main and group.response is not None and group.in_operation.resonances:
+        return next((number for number, own in enumerate(ranked) if group.is_leading(group.shown_peak(own))), -1)
     leading = (number for number, own in enumerate(ranked) if group.is_leading(group.shown_peak(own)))
     steady = (number for number, own in enumerate(ranked) if own.steady)
     return next(leading, next(steady, 0))
+
+
+def _leading(material: ReportData, group: RunGroup, variant: str) -> dict[str, int] | None:
+    """Return mode and order of the first resonance of the ranking; None if the group does not lead the page."""
+    headline = material.headline
+    if headline is None or headline.group is not group or headline.top is None or variant != group.main:
+        return None
+    mode = headline.mode_of(headline.top)
+    lines = [n for n, line in enumerate(material.lines) if math.isclose(line.order, headline.top.order, rel_tol=1e-6)]
+    if mode is None or not lines:
+        return None
+    return {"mode": mode.index, "line": lines[0]}
 
 
 def _highest(material: ReportData, spectra: Waterfall) -> int:

@@ -4,7 +4,7 @@
 /** @typedef {Uint8Array | Int8Array | Uint16Array | Int16Array | Uint32Array | Float32Array} Numbers */
 /** @typedef {{name: string, words: string, unit: string, cells: ArrayReference, floor: number, step: number, spacing: number, first: number, span: [number, number], cuts: ArrayReference, speeds: ArrayReference}} Channel */
 /** @typedef {{frequency: number, tolerance: number, speed: number, peak: number, line: number, level: number, steady: boolean, mode: number | null, facts: [string, string][]}} Resonance */
-/** @typedef {{words: string, model: string, window: string, channels: Channel[], constant: {cuts: ArrayReference, speeds: ArrayReference} | null, resonances: Resonance[], first: number}} VariantData */
+/** @typedef {{words: string, model: string, window: string, channels: Channel[], constant: {cuts: ArrayReference, speeds: ArrayReference} | null, resonances: Resonance[], first: number, leading: {mode: number, line: number} | null}} VariantData */
 /** @typedef {{name: string, title: string, words: string, source: string, main: string, variants: Record<string, VariantData>}} GroupData */
 /** @typedef {{name: string, short: string, sentence: string, order: number, harmonic: number, family: string}} LineData */
 /** @typedef {{name: string, label: string, owner: string, fixed: boolean, elastic: boolean, colour: string, reference: number[], turn: number, low: number[], span: number[], points: ArrayReference, triangles: ArrayReference}} BodyData */

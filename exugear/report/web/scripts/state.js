@@ -99,7 +99,8 @@ export const chooseLoudest = (choice) => choose({ ...choice, resonance: LOUDEST 
  */
 function followResonance(variant, choice) {
   if (!("model" in choice)) state.model = variant.model;
-  const own = variant.resonances[state.resonance];
+  // The first resonance of the ranking may be no peak of the transmission error: its mode and order are shown then.
+  const own = variant.resonances[state.resonance] ?? (state.resonance === -1 ? variant.leading : null);
   if (!own) return;
   if (!("mode" in choice)) state.mode = own.mode ?? -1;
   if (!("lines" in choice)) state.lines = [own.line];
