@@ -70,6 +70,8 @@ def report(
         raise BadInputError(f"{folder}: no such folder; specify the results folder of `exugear run`")
     if not changes.levers and (changes.resonance is not None or changes.loads):
         raise BadInputError("--resonance and --load are for design changes: add --levers")
+    for load in changes.loads:  # before long work
+        at_load(read_stored_gearbox(folder, Permissions(below=allow_dir)), load)
     other = None if compare is None else _results_of(compare)
     if other is not None and not other.is_dir():
         raise BadInputError(f"{other}: --compare: no such folder; specify the results folder of another design")
@@ -148,8 +150,6 @@ def _design_changes(folder: Path, allow_dir: Path | None, changes: DesignOptions
     usual = Choice(usual_variant(gearbox))
     leading = max(stored, key=lambda choice: list(Variant).index(choice.variant), default=usual)
     project = WatchedProject(gearbox, folder, leading)
-    for load in changes.loads:  # before long work
-        at_load(gearbox, load)
     project.prepare()
     if not stored:  # the page leads with a response
         project.steady(settings_of_study(gearbox))

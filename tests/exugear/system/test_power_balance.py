@@ -67,8 +67,9 @@ def tilting_power(q, v, mesh, memory):
         return 0.0
     read_flank(q, v, 0, 1, 1.0, mesh, memory)
     turned, rate = memory[READINGS, BY_TILT], memory[RATES, BY_TILT]
-    force, damper = memory[STATE, FORCE] / mesh.line_of_action[0], mesh.damping[0] * (
-        memory[STATE, RATE] - resists[TILT_LEVER] * rate
+    force, damper = (
+        memory[STATE, FORCE] / mesh.line_of_action[0],
+        mesh.damping[0] * (memory[STATE, RATE] - resists[TILT_LEVER] * rate),
     )
     moment = resists[TILT_MOMENT] - resists[TILT_STIFFNESS] * turned - resists[TILT_DAMPING] * rate
     way, _, beyond, _ = load_way(0, memory[STATE, PMC], mesh)
