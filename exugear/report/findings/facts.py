@@ -13,7 +13,7 @@ from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import REFERENCE_VARIANT, Context, choice_of
 from exugear.report.findings.groups import RankedResonance, RunGroup
 from exugear.report.findings.headline import headline_of_group
-from exugear.report.findings.parameter_variations import GAIN, BestChange, ModelVariations, best_change
+from exugear.report.findings.parameter_variations import BestChange, ModelVariations, best_change
 from exugear.report.findings.words import Labels, figure_text
 from exugear.results.spectra.waterfall import order_lines
 from exugear.steady.peaks import peaks
@@ -321,15 +321,10 @@ def _amplitude_reductions(
 
 
 def best_words(words: Labels, best: BestChange) -> str:
-    """State whether the best change of a parameter is worthwhile."""
+    """State how far a parameter lowers the largest TE amplification near a mode; this is a sensitivity, not advice."""
     change = words.change(best.label, best.value, best.default)
-    if best.gain < NO_GAIN:
-        if best.span < NO_GAIN:
-            return "No effect on the response within one octave."
-        return f"Other values only raise the response within one octave, by up to {figure_text(best.span, 2)} dB."
-    if best.gain < GAIN:
-        return (
-            f"No single change lowers the response within one octave by {GAIN:g} dB; best: {change}, −"
-            f"{figure_text(best.gain, 2)} dB."
-        )
-    return f"Best single change: {change}, −{figure_text(best.gain, 2)} dB within one octave."
+    if best.gain >= NO_GAIN:
+        return f"Lowest TE amplification within one octave: −{figure_text(best.gain, 2)} dB, with {change}."
+    if best.span < NO_GAIN:
+        return "No effect on the TE amplification within one octave."
+    return f"Other values only raise the TE amplification within one octave, by up to {figure_text(best.span, 2)} dB."

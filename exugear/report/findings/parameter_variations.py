@@ -27,8 +27,6 @@ from fe_ste.tools.threads import stop_if_asked
 
 OCTAVE = 2.0
 """Frequency ratio that limits the band around a mode, in both directions."""
-GAIN = 3.0
-"""Minimum gain (dB) that counts as a reduction."""
 
 Figures = tuple[Floats, Floats, Floats, Floats]
 """Frequency, TE participation, amplification and damping ratio of a `ParameterVariation`."""

@@ -9,7 +9,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.report.findings import facts
 from exugear.report.findings.facts import sensitivities_of
-from exugear.report.findings.parameter_variations import best_change, track_mode
+from exugear.report.findings.parameter_variations import BestChange, best_change, track_mode
 from exugear.report.findings.words import Labels
 from exugear.results.spectra.run_spectra import is_among, other_windows, survives
 from exugear.system.modes import modes_of
@@ -64,6 +64,18 @@ def test_a_followed_mode_that_fades_is_no_gain_where_another_takes_over():
     best = best_change(swapping(), 500.0)
     assert best.value == 2.0
     assert best.gain == pytest.approx(20.0 * np.log10(80.0 / 42.0))
+    assert best.span == pytest.approx(20.0 * np.log10(82.0 / 42.0))
+
+
+def test_the_words_on_a_variation_are_those_of_the_plotted_curve(gearbox):
+    """ "No effect" only where the curve is flat: where other values raise it, the words say so."""
+    words = Labels(gearbox)
+    lowered = facts.best_words(words, BestChange("mesh damping time / µs", 16.0, 4.0, 5.6, 6.0))
+    assert lowered == "Lowest TE amplification within one octave: −5.6 dB, with mesh damping time 16 instead of 4 µs."
+    flat = facts.best_words(words, BestChange("mesh damping time / µs", 4.0, 4.0, 0.0, 0.05))
+    assert flat == "No effect on the TE amplification within one octave."
+    raised = facts.best_words(words, BestChange("mesh damping time / µs", 4.0, 4.0, 0.0, 7.0))
+    assert "only raise" in raised and "7.0 dB" in raised
 
 
 def test_resonances_of_resonators_survive_all_windows_and_one_that_is_not_there_does_not(runs):
