@@ -190,8 +190,8 @@ def vector_peak(components: Complexes) -> Floats:
     """Return the largest magnitude (...) of vectors whose components (..., axes) oscillate at one frequency.
 
     The tip of Re(a exp(i w t)) moves along an ellipse. The square of its larger semi-axis is half of the sum of squares
-    of the components' magnitudes plus half of the magnitude of the sum of their squares. The root of the first sum alone
-    exceeds it by up to a factor of sqrt(2), for a vector that rotates.
+    of the components' magnitudes plus half of the magnitude of the sum of their squares. The root of the first sum
+    alone exceeds it by up to a factor of sqrt(2), for a vector that rotates.
 
     Examples
     --------
