@@ -304,8 +304,8 @@ class Parts:
     """exudyn.MainSystem."""
     assembly: Assembly
     nodes: dict[str, Any] = field(default_factory=dict)
-    """Node of each body; of an elastic one that of its main seat, and those of its seats under.
-    `exugear.gearbox.parts.seat_key`."""
+    """Node of each body by its name. A flexible body has the node of its main seat there; the nodes of its other seats
+    have the keys of `exugear.gearbox.parts.seat_key`."""
     bodies: dict[str, Any] = field(default_factory=dict)
     """Object of each rigid body."""
     elastic_nodes: dict[str, list[Any]] = field(default_factory=dict)
