@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,6 +21,7 @@ from exugear.report.findings.headline import (
     causes_of,
     contributions_of,
 )
+from exugear.report.findings.margins import shortfalls_of
 from exugear.report.findings.parameter_variations import default_place, track_mode
 from exugear.report.findings.ranking import HOUSING, SHAFTS, Envelope, Resonance, envelopes
 from exugear.report.findings.words import QUANTITIES, percentages, rounded_text
@@ -45,9 +45,9 @@ SHOWN_FRACTIONS = 2
 """Number of listed fractions of an energy."""
 SHOWN_CHANGES = 3
 """Number of listed design changes."""
-SHOWN_SHORTFALLS = 3
+SHOWN_SHORTFALLS = 2
 """Number of listed parts whose life falls short."""
-STRIPS = ((690.0, 350.0), (352.0, 440.0))
+STRIPS = ((690.0, 312.0), (352.0, 440.0))
 """Sizes of the diagrams of amplitude for windows of desktops and phones."""
 CAMPBELL = ((1120.0, 520.0), (352.0, 420.0))
 """Sizes of the Campbell diagrams."""
@@ -308,7 +308,7 @@ def _remedy_box(material: ReportData, headline: Headline) -> Box:
         count = sum(not result.refusal for result in study.results)
         text = f"None of {count} computed changes lowers the highest {label.column} in the range without "
         return Box(f"{text}raising another quantity by 1 dB or failing a requirement.", link=CHANGES_NAME)
-    text = f"Highest {label.column} in the range, recomputed; no other quantity rises by more than 1 dB."
+    text = f"Effect on the highest {label.column} in the range."
     return Box(text, changes=changes, link=CHANGES_NAME)
 
 
@@ -332,13 +332,18 @@ def _further(
 
 
 def _shortfalls(material: ReportData) -> Iterator[str]:
-    """Yield the parts that fail or fall short of their requirement in a stored rating, at most `SHOWN_SHORTFALLS`."""
-    for life in material.ratings.lives:
-        lines = [line for key in ("failures", "shortfalls") for line in json.loads(life.attrs[key])]
+    """Yield parts that fail or fall short of a requirement, at most `SHOWN_SHORTFALLS`.
+
+    They are those of stored ratings, or else of the unchanged gearbox of the design changes.
+    """
+    rated = [shortfalls_of(life) for life in material.ratings.lives]
+    if not rated and material.design_study is not None:
+        rated = [list(material.design_study.requirements)]
+    for lines in rated:
         for line in lines[:SHOWN_SHORTFALLS]:
             yield f"{material.words.labelled(line)}."
         if len(lines) > SHOWN_SHORTFALLS:
-            yield f'{len(lines) - SHOWN_SHORTFALLS} more in "Rating and life".'
+            yield f"{len(lines) - SHOWN_SHORTFALLS} more."
 
 
 def _leaders(material: ReportData, headline: Headline, top: Resonance) -> Iterator[str]:
