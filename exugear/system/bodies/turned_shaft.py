@@ -20,12 +20,12 @@ from exugear.system.bodies.reduction import (
     UY,
     UZ,
     Blank,
+    BodySurface,
     ReducedBody,
     ReducedComponent,
     ReductionError,
     ReductionSummary,
     Seat,
-    Surface,
     load_or_reduce,
     reduce_component,
     selective_mass_scaling,
@@ -214,7 +214,7 @@ def _surface(
     origin: tuple[float, float, float],
     components: Mapping[HarmonicName, ReducedComponent],
     layout: _Layout,
-) -> Surface:
+) -> BodySurface:
     """Turn the outline of the half-section into a surface with displacement and strain per coordinate."""
     outline = shaft.outline()
     angle = 2.0 * np.pi * np.arange(ANGLES) / ANGLES
@@ -239,7 +239,7 @@ def _surface(
             u_r, u_phi, u_z = np.moveaxis(weights[:, None, :, None] * moved * sign, 2, 0)
             displacement[..., index] = np.stack([u_r * c - u_phi * s, u_r * s + u_phi * c, u_z], axis=2)
             strain[..., index] = face_weights[:, None, :, None] * strained * sign
-    return Surface(
+    return BodySurface(
         points=points.reshape(-1, 3) + np.array(origin),
         quads=np.stack(corners, axis=2).reshape(-1, 4).astype(np.int64),
         displacement=displacement.reshape(-1, 3, layout.size),

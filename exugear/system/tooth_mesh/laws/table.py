@@ -111,7 +111,7 @@ BY_RATES, TABLE_MEMORY = BY_ARGUMENTS + 3, BY_ARGUMENTS + 6
 """Rows of the memory of `table_force` and `add_table_tangent`, (`TABLE_MEMORY`, 13)."""
 
 
-class Table(Law):
+class TableLaw(Law):
     """The whole table of a pair, both flanks."""
 
     form = TABLE_FORM
@@ -550,4 +550,4 @@ def _fill_table(arrays: TableArrays, m: int, flanks: TableFlanks, surface: SteSu
         arrays.has_guesses[m], arrays.acting_guesses[m, : acting.size] = 1, acting
 
 
-LAW = Table()
+LAW = TableLaw()
