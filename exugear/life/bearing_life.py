@@ -101,13 +101,13 @@ def bearing_lives(
     for number, support in enumerate(supports):
         if support.catalogue is None or not turns.get(support.name, 0.0):
             continue
-        case = _Case(support, acting, balance, number, oil)
+        case = _RatedBearing(support, acting, balance, number, oil)
         lives.append(case.life(turns[support.name]))
     return tuple(lives)
 
 
 @dataclass(frozen=True)
-class _Case:
+class _RatedBearing:
     """One bearing with its index in the balance."""
 
     support: Bearing

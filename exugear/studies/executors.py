@@ -40,7 +40,7 @@ from exugear.studies.quantities import Output, Values
 from exugear.studies.sampling import changed
 from exugear.system.gearbox_checks import check_parts
 from fe_ste.tools.files import FileError, open_regular, write_all
-from fe_ste.tools.threads import AtOnce, StoppedError, Workers, available_cores, stop_if_asked
+from fe_ste.tools.threads import AtOnce, Workers, WorkerStoppedError, available_cores, stop_if_asked
 
 # Journals of finished points: one line per point, keyed by the hash of its input, complete or ignored
 
@@ -234,7 +234,7 @@ def compute_batch(task: Task, batch: Sequence[Work]) -> list[Record]:
 
     Raises
     ------
-    StoppedError
+    WorkerStoppedError
         The computation was cancelled; finished points are recorded.
     OSError
         A finished point cannot be written.
@@ -272,7 +272,7 @@ def compute_point(task: Task, work: Work) -> Record:
                 error += f"{'; ' if error else ''}outputs.{name}: {reason}"
         doubts = list(results.doubts)
         results.clear()
-    except StoppedError:
+    except WorkerStoppedError:
         raise
     except Exception as reason:  # the failure of one point must not end the others
         values = {}
