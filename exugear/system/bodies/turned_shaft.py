@@ -99,7 +99,7 @@ def reduce_shaft(model: ShaftModel) -> ReducedBody:
         component = reduce_component(h.mass, h.stiffness, h.seats, h.rigid, _blank_masses(model, name), model.band)
         mass, mass_scaled[name] = selective_mass_scaling(component.mass, component.stiffness, model.limit)
         components[name] = replace(component, mass=mass)
-    layout = _Layout(len(seats), {name: c.component_modes.shape[1] for name, c in components.items()})
+    layout = _HarmonicLayout(len(seats), {name: c.component_modes.shape[1] for name, c in components.items()})
     gyroscopic = _gyroscopic(model, harmonics["bending"], components["bending"])
     spin = np.zeros(layout.size)
     spin[SPIN : 6 * len(seats) : 6] = 1.0
@@ -154,7 +154,7 @@ def _gyroscopic(model: ShaftModel, bending: Harmonic, component: ReducedComponen
     return symmetric(doubled)
 
 
-class _Layout:
+class _HarmonicLayout:
     """Indices of the coordinates of each harmonic among those of the body."""
 
     def __init__(self, seats: int, sizes: Mapping[HarmonicName, int]) -> None:
@@ -213,7 +213,7 @@ def _surface(
     shaft: Shaft,
     origin: tuple[float, float, float],
     components: Mapping[HarmonicName, ReducedComponent],
-    layout: _Layout,
+    layout: _HarmonicLayout,
 ) -> BodySurface:
     """Turn the outline of the half-section into a surface with displacement and strain per coordinate."""
     outline = shaft.outline()
