@@ -38,7 +38,7 @@ from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.steady.point_solver import harmonic_balance_model
 from exugear.steady.response import transmission_errors
 from exugear.system.system import input_hash
-from exugear.system.tooth_mesh.contact_state import ContactState
+from exugear.system.tooth_mesh.contact_state import MeshContactState
 from exugear.system.tooth_mesh.element import MeshCurve
 
 TARGET_HZ, NEAR, AROUND = 3215.0, 0.02, 0.10
@@ -78,7 +78,7 @@ class Given:
 
     gearbox: Gearbox
     stiffness: Mapping[str, Any]
-    contact: Mapping[str, ContactState]
+    contact: Mapping[str, MeshContactState]
 
 
 def given_by(project: Project) -> Given:

@@ -11,7 +11,7 @@ from exugear.cli.console import interruption, progress_bar
 from fe_ste.transmission_error.mean_contact import contacts_told
 
 
-class Row:
+class ProgressRow:
     """Progress of one kind of work: text, completed amount, remaining time. It is visible from the first call."""
 
     def __init__(self, bars: Bars) -> None:
@@ -35,9 +35,9 @@ class Bars:
         self._display: Progress | None = None
 
     @contextmanager
-    def row(self) -> Iterator[Row]:
+    def row(self) -> Iterator[ProgressRow]:
         """Yield a row for work inside the context; tooth contact computed there has its own row."""
-        contacts = Row(self)
+        contacts = ProgressRow(self)
 
         def solved(done: int, total: int) -> None:
             contacts(f"tooth contact at the static load: {done} of {total}", done, total)
@@ -47,7 +47,7 @@ class Bars:
                 self._outermost = own
                 own.callback(self._forget)
             own.enter_context(contacts_told(solved))
-            yield Row(self)
+            yield ProgressRow(self)
 
     def display(self) -> Progress:
         """Return the display of all rows; it closes with the outermost context."""
@@ -60,7 +60,7 @@ class Bars:
         self._outermost = self._display = None
 
 
-def files_read(row: Row) -> Callable[[int, int], None]:
+def files_read(row: ProgressRow) -> Callable[[int, int], None]:
     """Return a function that shows the number of load files read and of all; a single file has no row."""
 
     def show(done: int, total: int) -> None:

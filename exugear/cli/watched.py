@@ -7,7 +7,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from exugear.cli.bars import Bars, Row, files_read
+from exugear.cli.bars import Bars, ProgressRow, files_read
 from exugear.cli.console import BadInputError, FailedError, make_results_folder, note, warn
 from exugear.gearbox.reading import GearboxFileError
 from exugear.project import Project
@@ -159,7 +159,7 @@ class WatchedProject(Project):
             return super().rating(*_life_progress(row))
 
 
-def _life_progress(row: Row) -> tuple[Callable[[str], None], Callable[[int, int], None]]:
+def _life_progress(row: ProgressRow) -> tuple[Callable[[str], None], Callable[[int, int], None]]:
     """Return functions that show the pair whose root stress is computed, and the number of computed static states."""
     return (
         lambda pair: row(f"{pair}: root stress by finite elements"),
@@ -175,7 +175,7 @@ def errors_of_tables(tables: Mapping[str, MeshTable]) -> list[str]:
     return [doubt for name, table in tables.items() for doubt in table_warnings(name, table)]
 
 
-def _computed(request: TableRequest, row: Row, before: int, total: int) -> MeshTable:
+def _computed(request: TableRequest, row: ProgressRow, before: int, total: int) -> MeshTable:
     """Compute a table; its row counts the work of all missing tables, part of which is already done."""
     row(f"{request.name}: finite elements", before, total)
     what = "position" if request.states == request.wanted.positions else "state"

@@ -338,7 +338,7 @@ class _Reader:
 
 
 @dataclass(frozen=True, eq=False)
-class _Layout:
+class _ValueLayout:
     """Layout of the values, from the header of a file."""
 
     kind: int
@@ -382,7 +382,7 @@ def open_openfast_binary(path: Path) -> Channels:
     return Channels(path, layout.names[1:], layout.units[1:], layout.units[0], read)
 
 
-def _layout(reader: _Reader) -> _Layout:
+def _layout(reader: _Reader) -> _ValueLayout:
     path = reader.path
     (kind,) = reader.numbers("h", "format")
     if kind not in (WITH_TIME, WITHOUT_TIME, NOT_COMPRESSED, LONG_NAMES):
@@ -404,12 +404,12 @@ def _layout(reader: _Reader) -> _Layout:
     times = reader.file.tell()
     rows = times + (4 * steps if kind == WITH_TIME else 0)
     reader.demand(rows - times, "times")
-    layout = _Layout(int(kind), steps, first, second, scales, offsets, names, units, times, rows)
+    layout = _ValueLayout(int(kind), steps, first, second, scales, offsets, names, units, times, rows)
     reader.demand(rows - times + steps * channels * layout.value.itemsize, "values")
     return layout
 
 
-def _blocks(path: Path, layout: _Layout, places: tuple[int, ...]) -> Iterator[tuple[Floats, Floats]]:
+def _blocks(path: Path, layout: _ValueLayout, places: tuple[int, ...]) -> Iterator[tuple[Floats, Floats]]:
     """Yield time and the values of some channels, in the units of the file, by blocks of steps."""
     chosen = list(places)
     for place in chosen:

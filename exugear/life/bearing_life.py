@@ -17,7 +17,7 @@ from exugear.gearbox.parts import Bearing
 from exugear.gearbox.sections.loads import LubricantSection
 from exugear.gearbox.units import KN
 from exugear.life.static_balance import ActingLoads, StaticBalance
-from exugear.system.bearings.duty import Ratings, cage_angles, loads_of_rows, ratings_of
+from exugear.system.bearings.duty import LoadRatings, cage_angles, loads_of_rows, ratings_of
 from exugear.system.bearings.rolling.catalogue import catalogue_rows
 from exugear.system.bearings.rolling.contact import BearingState, equilibrium
 from exugear.system.bearings.rolling.life import (
@@ -75,7 +75,7 @@ class BearingLife:
     """Maximum contact stress of rolling elements under the largest load, Pa; NaN as for L10r."""
     static_safety: float
     """C_0r over the largest static equivalent load."""
-    ratings: Ratings
+    ratings: LoadRatings
     remarks: tuple[str, ...]
     by_bin: Floats
     reference_by_bin: Floats
@@ -101,13 +101,13 @@ def bearing_lives(
     for number, support in enumerate(supports):
         if support.catalogue is None or not turns.get(support.name, 0.0):
             continue
-        case = _Case(support, acting, balance, number, oil)
+        case = _RatedBearing(support, acting, balance, number, oil)
         lives.append(case.life(turns[support.name]))
     return tuple(lives)
 
 
 @dataclass(frozen=True)
-class _Case:
+class _RatedBearing:
     """One bearing with its index in the balance."""
 
     support: Bearing
@@ -172,7 +172,7 @@ class _Case:
             modified_by_bin=self.acting.sum_by_bin(by_modified),
         )
 
-    def _remarks(self, ratings: Ratings, ratio: float, largest: float, least: float) -> list[str]:
+    def _remarks(self, ratings: LoadRatings, ratio: float, largest: float, least: float) -> list[str]:
         """Return remarks on minimum viscosity ratio, largest and minimum load (N), and the source of the ratings."""
         remarks = []
         if ratio < LEAST_RATIO:
@@ -190,7 +190,7 @@ class _Case:
         return remarks
 
     def _life_factor(
-        self, rows: tuple[RollingRow, ...], ratings: Ratings, loads: Floats, speed: Floats
+        self, rows: tuple[RollingRow, ...], ratings: LoadRatings, loads: Floats, speed: Floats
     ) -> tuple[Floats, float]:
         """Return a_ISO for equivalent loads (points, angles) at ring speeds (points,), and the minimum viscosity ratio.
 
@@ -213,7 +213,7 @@ class _Case:
         return np.array(factors).reshape(loads.shape), float(turning.min(initial=math.inf))
 
     def _reference(
-        self, rows: tuple[RollingRow, ...], ratings: Ratings, loads: Floats, revolutions: Floats, worst: Floats
+        self, rows: tuple[RollingRow, ...], ratings: LoadRatings, loads: Floats, revolutions: Floats, worst: Floats
     ) -> tuple[tuple[Floats, Floats] | None, float, list[str]]:
         """Return L10r (millions of revolutions) over radial load (N), maximum contact stress (Pa), and remarks.
 
@@ -247,7 +247,7 @@ class _Case:
         return (radial, lives), pressure, remarks
 
     def _life_at(
-        self, rows: tuple[RollingRow, ...], ratings: Ratings, force: Floats, tilt: Floats
+        self, rows: tuple[RollingRow, ...], ratings: LoadRatings, force: Floats, tilt: Floats
     ) -> tuple[float, float]:
         """Return L10r (millions of revolutions) and maximum contact stress (Pa) under a force (N) and a tilt (rad)."""
         section = self.support.catalogue

@@ -206,7 +206,9 @@ def flank_lives(
             continue
         for sense in (1, -1):
             if np.any(acting.torques * sense > 0.0):
-                case = _Case(gearbox, rating, tooth, pair, balance, stresses[pair.name], dynamic[tooth.family], sense)
+                case = _RatedTooth(
+                    gearbox, rating, tooth, pair, balance, stresses[pair.name], dynamic[tooth.family], sense
+                )
                 one = case.life(acting)
                 lives.setdefault((one.gear, one.family, one.flank), []).append(one)
     return tuple(worst_of(life) for life in lives.values())
@@ -236,7 +238,7 @@ def worst_of(lives: Sequence[FlankLife]) -> FlankLife:
 
 
 @dataclass(frozen=True)
-class _Case:
+class _RatedTooth:
     """One tooth in one family of meshes under torques of one sign."""
 
     gearbox: Gearbox

@@ -38,7 +38,7 @@ TORQUE_SHARES = (0.1, 0.25, 0.5, 0.75, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Response:
+class BalanceResponse:
     """Result of the balance over torques and angles, and its change by rotor loads."""
 
     values: Floats
@@ -46,9 +46,9 @@ class Response:
     by_hub: Floats | None = None
     """(t, 5, a, ...) change per unit of each rotor load."""
 
-    def of(self, number: int) -> Response:
+    def of(self, number: int) -> BalanceResponse:
         """Return the response of one bearing, by its index on the axis after the angles."""
-        return Response(self.values[:, :, number], None if self.by_hub is None else self.by_hub[:, :, :, number])
+        return BalanceResponse(self.values[:, :, number], None if self.by_hub is None else self.by_hub[:, :, :, number])
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,13 +58,13 @@ class StaticBalance(ReprMixin, line=": {torque!n} torques, {angle!n} angles, lin
     torque: Floats
     angle: Floats
     """(t,) torque on the loaded body, N m, ascending, without zero; (a,) angle of the carrier, rad."""
-    mesh_force: Response
-    misalignment: Response
+    mesh_force: BalanceResponse
+    misalignment: BalanceResponse
     """(t, a, meshes) F_bt, N, positive on the flank of the static load; misalignment on the tables' flank, rad."""
-    bearing_load: Response
+    bearing_load: BalanceResponse
     """(t, a, bearings, 6) force and moment of the shaft on the inner ring, in the axes of the supporting body, N
     and N m."""
-    bearing_tilt: Response
+    bearing_tilt: BalanceResponse
     """(t, a, bearings, 2) tilt of the inner relative to the outer ring in the same axes, rad."""
     linear: bool
     """Whether all results are proportional to the loads."""
@@ -72,7 +72,7 @@ class StaticBalance(ReprMixin, line=": {torque!n} torques, {angle!n} angles, lin
     """Meshes whose load, centre distance or misalignment is outside the range of their table in any state, where it is
     extrapolated linearly."""
 
-    def at(self, response: Response, torque: Floats, hub: Floats | None = None) -> Floats:
+    def at(self, response: BalanceResponse, torque: Floats, hub: Floats | None = None) -> Floats:
         """Return the values of a response at torques (n,) and rotor loads (n, 5): (n, a, ...).
 
         Values are interpolated linearly between solved torques of the same sign.
@@ -277,14 +277,14 @@ def _wrenches(assembly: Assembly, body: str, hub: Floats) -> list[Floats | None]
     return found
 
 
-def _response(parts: Sequence[Floats], sizes: Floats) -> Response:
+def _response(parts: Sequence[Floats], sizes: Floats) -> BalanceResponse:
     """Return one result of the states of all angles over torque and angle, with its changes by rotor loads."""
     together = np.stack(parts, axis=2)  # torque, rotor load, angle
     values = np.ascontiguousarray(together[:, 0])
     if not sizes.any():
-        return Response(values)
+        return BalanceResponse(values)
     steps = np.where(sizes > 0.0, sizes, 1.0).reshape(-1, *(1,) * (values.ndim - 1))
-    return Response(values, (together[:, 1:] - values[:, None]) / steps)
+    return BalanceResponse(values, (together[:, 1:] - values[:, None]) / steps)
 
 
 def is_linear(assembly: Assembly) -> bool:

@@ -48,7 +48,7 @@ STATE = (
     Variable("state_judgement", ("criterion", "figure"), "value, s, index"),
     Variable("state_pending", ("pending", "signal"), "of the signals"),
 )
-"""Variables in which a `Checkpoint` is stored."""
+"""Variables in which a `RunCheckpoint` is stored."""
 VARIABLES = {variable.name: variable for variable in (*(signal for signal in SIGNALS if signal.stored), *STATE)}
 """All variables by name, in the order of the file; a run contains those of its mesh model."""
 GROWING = ("time", "balance_time")
@@ -62,7 +62,7 @@ _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Checkpoint:
+class RunCheckpoint:
     """State from which a run is resumed."""
 
     step: int
@@ -171,7 +171,9 @@ class RunPieces:
         self.lengths = {name: self.lengths[name] + len(piece.arrays[name]) for name in GROWING}
         self.lengths["pending"] = len(piece.arrays["state_pending"])
 
-    def append(self, times: Floats, rows: Floats, balance_times: Floats, balances: Floats, state: Checkpoint) -> Piece:
+    def append(
+        self, times: Floats, rows: Floats, balance_times: Floats, balances: Floats, state: RunCheckpoint
+    ) -> Piece:
         """Write a piece and return it.
 
         Parameters
@@ -206,12 +208,12 @@ class RunPieces:
         self._count(path, piece, piece.write(path))
         return piece
 
-    def last_checkpoint(self) -> Checkpoint:
+    def last_checkpoint(self) -> RunCheckpoint:
         """Read the state at the end of the last piece."""
         last, _ = Piece.read(self.paths[-1])
         arrays = last.arrays
         attributes = last.attributes
-        return Checkpoint(
+        return RunCheckpoint(
             step=int(attributes["state_step"]),
             q=arrays["state_q"],
             v=arrays["state_v"],

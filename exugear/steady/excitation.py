@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from exugear.steady.harmonics.lines import (
-    Coupling,
+    HarmonicCoupling,
     LineSet,
     TorusSampling,
     beside,
@@ -467,11 +467,13 @@ class HarmonicBalanceModel:
         return families(self.waves)
 
     @cached_property
-    def coupling(self) -> Coupling:
+    def coupling(self) -> HarmonicCoupling:
         """Products of all forces along a row with functions of the mesh cycles."""
         forces = self._ports["forces"].shape[2]
         bases = self.lines.index.shape[1]
-        return Coupling(self.lines, tuple(group_of(family, self.harmonics, forces, bases) for family in self._families))
+        return HarmonicCoupling(
+            self.lines, tuple(group_of(family, self.harmonics, forces, bases) for family in self._families)
+        )
 
     def coupled(self, spectra: Spectra, ports: MeshInterface, speed: float) -> list[Complexes]:
         """Functions of the mesh cycles, by their harmonics, as `coupling` takes them at a speed of the input."""

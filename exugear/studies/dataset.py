@@ -212,7 +212,7 @@ class EvaluatedPoint:
         return self.draws[0][0]
 
 
-Quantity = Callable[[EvaluatedPoint, str], Floats]
+OutputValues = Callable[[EvaluatedPoint, str], Floats]
 """Function that returns an output for all draws of a point; NaN for failed draws."""
 
 
@@ -254,12 +254,12 @@ class Criteria:
             return filled[..., 0]
         return percentile_of(filled, self.percent(side))
 
-    def minimised(self, quantity: Quantity, points: Sequence[EvaluatedPoint]) -> Floats:
+    def minimised(self, quantity: OutputValues, points: Sequence[EvaluatedPoint]) -> Floats:
         """Return the outputs (points, outputs) to be minimised; infinite where a point failed."""
         found = [[float(self.reduce_draws(quantity(point, name), "high")) for name in self.outputs] for point in points]
         return np.array(found).reshape(len(points), len(self.outputs))
 
-    def violations(self, quantity: Quantity, points: Sequence[EvaluatedPoint]) -> Floats:
+    def violations(self, quantity: OutputValues, points: Sequence[EvaluatedPoint]) -> Floats:
         """Return the violations of limits (points, limits), relative to the absolute limit; negative within limits."""
         found = [
             [

@@ -40,7 +40,7 @@ from exugear.studies.quantities import Output, Values
 from exugear.studies.sampling import changed
 from exugear.system.gearbox_checks import check_parts
 from fe_ste.tools.files import FileError, open_regular, write_all
-from fe_ste.tools.threads import AtOnce, StoppedError, Workers, available_cores, stop_if_asked
+from fe_ste.tools.threads import AtOnce, Workers, WorkerStoppedError, available_cores, stop_if_asked
 
 # Journals of finished points: one line per point, keyed by the hash of its input, complete or ignored
 
@@ -216,7 +216,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Work:
+class PointInput:
     """Data of a point sent to a worker: the hash of its input, and values by path in the gearbox file."""
 
     point: str
@@ -229,12 +229,12 @@ def _journal(folder: Path) -> Journal:
     return Journal(folder)
 
 
-def compute_batch(task: Task, batch: Sequence[Work]) -> list[Record]:
+def compute_batch(task: Task, batch: Sequence[PointInput]) -> list[Record]:
     """Compute points, with dense linear algebra limited to one thread.
 
     Raises
     ------
-    StoppedError
+    WorkerStoppedError
         The computation was cancelled; finished points are recorded.
     OSError
         A finished point cannot be written.
@@ -255,7 +255,7 @@ def compute_batch(task: Task, batch: Sequence[Work]) -> list[Record]:
     return records
 
 
-def compute_point(task: Task, work: Work) -> Record:
+def compute_point(task: Task, work: PointInput) -> Record:
     """Compute one point; errors become part of its record."""
     start = time.perf_counter()
     values: dict[str, Any] = {}
@@ -272,7 +272,7 @@ def compute_point(task: Task, work: Work) -> Record:
                 error += f"{'; ' if error else ''}outputs.{name}: {reason}"
         doubts = list(results.doubts)
         results.clear()
-    except StoppedError:
+    except WorkerStoppedError:
         raise
     except Exception as reason:  # the failure of one point must not end the others
         values = {}
@@ -280,7 +280,7 @@ def compute_point(task: Task, work: Work) -> Record:
     return Record(work.point, values, error, doubts, round(time.perf_counter() - start, 6), peak_memory())
 
 
-def _built(task: Task, work: Work) -> Gearbox:
+def _built(task: Task, work: PointInput) -> Gearbox:
     """Return the gearbox of a point; the error of an invalid one begins with the parameters and their values."""
     try:
         gearbox = Gearbox.from_dict(changed(task.content, work.changes), task.source, task.permissions)
@@ -312,10 +312,10 @@ class ExecutorError(RuntimeError):
     """Error: workers cannot be reached, or were lost and cannot be replaced; finished points are kept."""
 
 
-class Submits(Protocol):
+class StudyExecutor(Protocol):
     """Protocol required of an executor."""
 
-    def submit(self, fn: Callable[[Task, Sequence[Work]], list[Record]], /, *args: Any) -> Future[list[Record]]:
+    def submit(self, fn: Callable[[Task, Sequence[PointInput]], list[Record]], /, *args: Any) -> Future[list[Record]]:
         """Schedule a call and return its future."""
         ...
 
@@ -324,7 +324,7 @@ class Submits(Protocol):
 class Pool:
     """Running executor."""
 
-    executor: Submits
+    executor: StudyExecutor
     """Object with the protocol of `concurrent.futures.Executor`."""
     workers: int
     """Number of batches computed at the same time."""
@@ -379,7 +379,7 @@ def dask_cluster(address: str) -> Opens:
     return opened
 
 
-def given(executor: Submits, workers: int | None = None) -> Opens:
+def given(executor: StudyExecutor, workers: int | None = None) -> Opens:
     """Return an executor that the caller starts and ends.
 
     Parameters
@@ -491,9 +491,9 @@ Tell = Callable[[Record], None]
 class _Running:
     """Waiting points, batches of workers, and returned records."""
 
-    def __init__(self, task: Task, points: Iterable[Work], tell: Tell) -> None:
+    def __init__(self, task: Task, points: Iterable[PointInput], tell: Tell) -> None:
         self.task, self.tell = task, tell
-        self.waiting, self.alone = deque(points), deque[Work]()
+        self.waiting, self.alone = deque(points), deque[PointInput]()
         self.losses: Counter[str] = Counter()
         self.found: dict[str, Record] = {}
         self.pace = Pace()
@@ -513,7 +513,7 @@ class _Running:
         BrokenExecutor
             The pool has lost its workers; their points are queued again.
         """
-        at_work: dict[Future[list[Record]], list[Work]] = {}
+        at_work: dict[Future[list[Record]], list[PointInput]] = {}
         try:
             while self.waiting or self.alone or at_work:
                 self._send(pool, at_work)
@@ -525,7 +525,7 @@ class _Running:
             self.again([work for batch in at_work.values() for work in batch])
             raise
 
-    def _send(self, pool: Pool, at_work: dict[Future[list[Record]], list[Work]]) -> None:
+    def _send(self, pool: Pool, at_work: dict[Future[list[Record]], list[PointInput]]) -> None:
         ahead = BATCHES_A_WORKER * pool.workers
         while self.waiting and len(at_work) < ahead:
             size = min(self.pace.count, max(1, len(self.waiting) // ahead))
@@ -538,7 +538,7 @@ class _Running:
             at_work[pool.executor.submit(compute_batch, self.task, batch)] = batch
             self.alone.popleft()
 
-    def _gather(self, future: Future[list[Record]], batch: list[Work]) -> None:
+    def _gather(self, future: Future[list[Record]], batch: list[PointInput]) -> None:
         """Take the result of a finished batch.
 
         Raises
@@ -558,7 +558,7 @@ class _Running:
         self.pace.learn([record.seconds for record in records])
         self.take(records)
 
-    def again(self, lost: list[Work]) -> None:
+    def again(self, lost: list[PointInput]) -> None:
         """Queue the unfinished points of lost workers again; abandon points that repeatedly lose their worker."""
         self.take(read_journals(self.task.folder, {work.point for work in lost}).values())
         for work in lost:
@@ -573,7 +573,7 @@ class _Running:
                 (self.alone if self.losses[work.point] >= ALONE_AFTER else self.waiting).append(work)
 
 
-def compute_points(task: Task, points: Iterable[Work], opens: Opens, tell: Tell) -> dict[str, Record]:
+def compute_points(task: Task, points: Iterable[PointInput], opens: Opens, tell: Tell) -> dict[str, Record]:
     """Compute points on workers.
 
     Parameters

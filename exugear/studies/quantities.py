@@ -41,7 +41,7 @@ class OutputError(ValueError):
 
 
 @dataclass(frozen=True)
-class Quantity:
+class OutputKind:
     """Kind of output of a point."""
 
     function: Callable[..., Values]
@@ -553,50 +553,50 @@ def _number_of(holder: str) -> float:
 
 AS_SIGNAL = "as the signal"
 """Unit of outputs with the unit of the signal in their option `signal`."""
-QUANTITIES: dict[str, Quantity] = {
-    "ste_peak_to_peak": Quantity(ste_peak_to_peak, "m"),
-    "ste_harmonic": Quantity(ste_harmonic, "m"),
-    "mesh_stiffness": Quantity(mesh_stiffness, "N/m"),
-    "contact_pressure": Quantity(contact_pressure, "Pa"),
-    "worst_ripple": Quantity(worst_ripple, "m"),
-    "mean_ripple": Quantity(mean_ripple, "m"),
-    "worst_pressure": Quantity(worst_pressure, "Pa"),
-    "mesh_forces": Quantity(mesh_forces, "N", "mesh"),
-    "misalignments": Quantity(misalignments, "rad", "mesh"),
-    "load_sharing": Quantity(load_sharing, "1"),
-    "frequencies": Quantity(frequencies, "Hz", "mode"),
-    "nearest_frequency": Quantity(nearest_frequency, "Hz"),
-    "nearest_damping": Quantity(nearest_damping, "1"),
-    "nearest_amplification": Quantity(nearest_amplification, "m/m"),
-    "nearest_strain": Quantity(nearest_strain, "1"),
-    "loudest_frequency": Quantity(loudest_frequency, "Hz"),
-    "largest_line": Quantity(largest_line, AS_SIGNAL, needs="steady"),
-    "loudest_peak": Quantity(loudest_peak, AS_SIGNAL, needs="steady"),
-    "loudest_speed": Quantity(loudest_speed, "rad/s", needs="steady"),
-    "harmonics": Quantity(harmonics, AS_SIGNAL, "harmonic", "steady"),
-    "rms": Quantity(rms, AS_SIGNAL, needs="run"),
-    "peak_to_peak": Quantity(peak_to_peak, AS_SIGNAL, needs="run"),
-    "final_speed": Quantity(final_speed, "rad/s", needs="run"),
-    "dynamic_load_sharing": Quantity(dynamic_load_sharing, "1", needs="run"),
-    "run_harmonics": Quantity(run_harmonics, AS_SIGNAL, "harmonic", "run"),
-    "order_amplitudes": Quantity(order_amplitudes, AS_SIGNAL, "sideband", "run"),
-    "contact_safeties": Quantity(contact_safeties, "1", "flank", "life"),
-    "root_safeties": Quantity(root_safeties, "1", "flank", "life"),
-    "contact_damages": Quantity(contact_damages, "1", "flank", "life"),
-    "root_damages": Quantity(root_damages, "1", "flank", "life"),
-    "worst_planets": Quantity(worst_planets, "1", "flank", "life"),
-    "contact_safety": Quantity(contact_safety, "1", needs="life"),
-    "root_safety": Quantity(root_safety, "1", needs="life"),
-    "contact_damage": Quantity(contact_damage, "1", needs="life"),
-    "root_damage": Quantity(root_damage, "1", needs="life"),
-    "bearing_lives": Quantity(bearing_lives, "h", "bearing", "bearings"),
-    "bearing_damages": Quantity(bearing_damages, "1", "bearing", "bearings"),
-    "static_safeties": Quantity(static_safeties, "1", "bearing", "bearings"),
-    "bearing_life": Quantity(bearing_life, "h", needs="bearings"),
-    "bearing_damage": Quantity(bearing_damage, "1", needs="bearings"),
-    "static_safety": Quantity(static_safety, "1", needs="bearings"),
-    "life_hours": Quantity(life_hours, "h", needs="life"),
-    "shortfalls": Quantity(shortfalls, "1", needs="life"),
+QUANTITIES: dict[str, OutputKind] = {
+    "ste_peak_to_peak": OutputKind(ste_peak_to_peak, "m"),
+    "ste_harmonic": OutputKind(ste_harmonic, "m"),
+    "mesh_stiffness": OutputKind(mesh_stiffness, "N/m"),
+    "contact_pressure": OutputKind(contact_pressure, "Pa"),
+    "worst_ripple": OutputKind(worst_ripple, "m"),
+    "mean_ripple": OutputKind(mean_ripple, "m"),
+    "worst_pressure": OutputKind(worst_pressure, "Pa"),
+    "mesh_forces": OutputKind(mesh_forces, "N", "mesh"),
+    "misalignments": OutputKind(misalignments, "rad", "mesh"),
+    "load_sharing": OutputKind(load_sharing, "1"),
+    "frequencies": OutputKind(frequencies, "Hz", "mode"),
+    "nearest_frequency": OutputKind(nearest_frequency, "Hz"),
+    "nearest_damping": OutputKind(nearest_damping, "1"),
+    "nearest_amplification": OutputKind(nearest_amplification, "m/m"),
+    "nearest_strain": OutputKind(nearest_strain, "1"),
+    "loudest_frequency": OutputKind(loudest_frequency, "Hz"),
+    "largest_line": OutputKind(largest_line, AS_SIGNAL, needs="steady"),
+    "loudest_peak": OutputKind(loudest_peak, AS_SIGNAL, needs="steady"),
+    "loudest_speed": OutputKind(loudest_speed, "rad/s", needs="steady"),
+    "harmonics": OutputKind(harmonics, AS_SIGNAL, "harmonic", "steady"),
+    "rms": OutputKind(rms, AS_SIGNAL, needs="run"),
+    "peak_to_peak": OutputKind(peak_to_peak, AS_SIGNAL, needs="run"),
+    "final_speed": OutputKind(final_speed, "rad/s", needs="run"),
+    "dynamic_load_sharing": OutputKind(dynamic_load_sharing, "1", needs="run"),
+    "run_harmonics": OutputKind(run_harmonics, AS_SIGNAL, "harmonic", "run"),
+    "order_amplitudes": OutputKind(order_amplitudes, AS_SIGNAL, "sideband", "run"),
+    "contact_safeties": OutputKind(contact_safeties, "1", "flank", "life"),
+    "root_safeties": OutputKind(root_safeties, "1", "flank", "life"),
+    "contact_damages": OutputKind(contact_damages, "1", "flank", "life"),
+    "root_damages": OutputKind(root_damages, "1", "flank", "life"),
+    "worst_planets": OutputKind(worst_planets, "1", "flank", "life"),
+    "contact_safety": OutputKind(contact_safety, "1", needs="life"),
+    "root_safety": OutputKind(root_safety, "1", needs="life"),
+    "contact_damage": OutputKind(contact_damage, "1", needs="life"),
+    "root_damage": OutputKind(root_damage, "1", needs="life"),
+    "bearing_lives": OutputKind(bearing_lives, "h", "bearing", "bearings"),
+    "bearing_damages": OutputKind(bearing_damages, "1", "bearing", "bearings"),
+    "static_safeties": OutputKind(static_safeties, "1", "bearing", "bearings"),
+    "bearing_life": OutputKind(bearing_life, "h", needs="bearings"),
+    "bearing_damage": OutputKind(bearing_damage, "1", needs="bearings"),
+    "static_safety": OutputKind(static_safety, "1", needs="bearings"),
+    "life_hours": OutputKind(life_hours, "h", needs="life"),
+    "shortfalls": OutputKind(shortfalls, "1", needs="life"),
 }
 """Outputs by the name in a study file."""
 
@@ -605,7 +605,7 @@ QUANTITIES: dict[str, Quantity] = {
 class Output:
     """Output with its options."""
 
-    quantity: Quantity
+    quantity: OutputKind
     options: Mapping[str, Any]
 
     @property
@@ -621,7 +621,7 @@ class Output:
         return self.quantity.of(results, self.options)
 
 
-def outputs_of(sections: Mapping[str, Mapping[str, Any]], known: Mapping[str, Quantity]) -> dict[str, Output]:
+def outputs_of(sections: Mapping[str, Mapping[str, Any]], known: Mapping[str, OutputKind]) -> dict[str, Output]:
     """Check the sections of a study file and return the outputs they specify.
 
     Parameters

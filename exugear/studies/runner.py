@@ -22,9 +22,9 @@ from exugear.studies.dataset import Criteria, EvaluatedPoint, dataset_of, search
 from exugear.studies.executors import (
     Opens,
     PersistentPool,
+    PointInput,
     Record,
     Task,
-    Work,
     compute_points,
     number_of,
     processes,
@@ -141,7 +141,7 @@ def run_study(
     if wanted:
         folder.mkdir(parents=True, exist_ok=True)
         write_file(folder / STUDY_FILE, study.file.model_dump_json(indent=1, exclude_none=True).encode("utf-8"))
-        work = [Work(name, points[name]) for name in wanted]
+        work = [PointInput(name, points[name]) for name in wanted]
         records |= compute_points(task_of(study, folder), work, opens or processes(), tell)
     records |= {name: record for name, record in read_journals(folder, points).items() if name not in records}
     if len(records) < len(points) and not merge:
@@ -236,7 +236,7 @@ class _Evaluated:
         unknown = [name for name in draws if name not in self.records]
         if unknown:
             self.records |= read_journals(self.task.folder, set(unknown))
-        missing = [Work(name, draws[name]) for name in unknown if name not in self.records]
+        missing = [PointInput(name, draws[name]) for name in unknown if name not in self.records]
         if missing:
             self.records |= compute_points(self.task, missing, self.opens, self._report_record)
         self.computed += len(missing)

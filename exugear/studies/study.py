@@ -37,7 +37,7 @@ from exugear.studies.quantities import (
     SAFETIES,
     Output,
     OutputError,
-    Quantity,
+    OutputKind,
     nearest_names,
     outputs_of,
 )
@@ -347,7 +347,10 @@ class Study(ReprMixin):
 
     @classmethod
     def from_toml(
-        cls, path: str | Path, permissions: Permissions = NOTHING_MORE, quantities: Mapping[str, Quantity] = QUANTITIES
+        cls,
+        path: str | Path,
+        permissions: Permissions = NOTHING_MORE,
+        quantities: Mapping[str, OutputKind] = QUANTITIES,
     ) -> Study:
         """Read and check a study file and its gearbox file.
 
@@ -370,14 +373,14 @@ class Study(ReprMixin):
         content: dict[str, Any],
         source: str = "study",
         permissions: Permissions = NOTHING_MORE,
-        quantities: Mapping[str, Quantity] = QUANTITIES,
+        quantities: Mapping[str, OutputKind] = QUANTITIES,
     ) -> Study:
         """Check content already in memory; the path of its gearbox file is relative to the working directory."""
         return cls._checked(parse_study(content, source), source, Path(), permissions, quantities)
 
     @classmethod
     def _checked(
-        cls, file: StudyFile, source: str, folder: Path, permissions: Permissions, quantities: Mapping[str, Quantity]
+        cls, file: StudyFile, source: str, folder: Path, permissions: Permissions, quantities: Mapping[str, OutputKind]
     ) -> Study:
         case = Gearbox.from_toml(folder / file.case, permissions)
         try:

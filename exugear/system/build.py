@@ -24,7 +24,7 @@ from exugear.system.kernels.turning import TravellingArrays, no_travelling
 from exugear.system.modal_damping import with_damping_times, with_modal_damping
 from exugear.system.operating_points import linearise_at_static_load
 from exugear.system.system import Assembly
-from exugear.system.tooth_mesh.contact_state import ContactState
+from exugear.system.tooth_mesh.contact_state import MeshContactState
 from exugear.system.tooth_mesh.element import Angles, MeshData, mesh_elements
 from exugear.system.tooth_mesh.laws.registry import LAWS, law_of
 from exugear.system.tooth_mesh.laws.stiffness import pack
@@ -39,7 +39,7 @@ def assemble(
     *,
     flanks: Mapping[str, int] | None = None,
     angles: Angles = "reference",
-    contact: Mapping[str, ContactState] | None = None,
+    contact: Mapping[str, MeshContactState] | None = None,
     before_balance: Callable[[Assembly], None] | None = None,
 ) -> Assembly:
     """Assemble the equations of motion of a gearbox.

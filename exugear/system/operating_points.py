@@ -58,7 +58,7 @@ CONTACT_STEPS = 2
 """Steps between shafts and contact: a third one changes misalignments by less than a hundredth of an urad."""
 
 
-class _State(NamedTuple):
+class _SupportState(NamedTuple):
     """All supports in one static state; points only of those from a catalogue."""
 
     strain: Floats
@@ -230,15 +230,17 @@ def _resting(assembly: Assembly, points: Sequence[OperatingPoint | None]) -> tup
     return replace(assembly, connectors=connectors, rows_stiffness=np.array(of_rows)), placed
 
 
-def _state(assembly: Assembly, laws: Sequence[SupportLaw], q: Floats) -> _State:
+def _state(assembly: Assembly, laws: Sequence[SupportLaw], q: Floats) -> _SupportState:
     strain = assembly.support_strains(q)
-    return _State(strain, assembly.support_loads_at_rest(q), _points(assembly, laws, strain))
+    return _SupportState(strain, assembly.support_loads_at_rest(q), _points(assembly, laws, strain))
 
 
-def _states(assembly: Assembly, laws: Sequence[SupportLaw], near: Floats) -> tuple[_State, dict[str, list[_State]]]:
+def _states(
+    assembly: Assembly, laws: Sequence[SupportLaw], near: Floats
+) -> tuple[_SupportState, dict[str, list[_SupportState]]]:
     """State at the angles zero, from a state that is near it; those over the turn of carriers with unequal planets."""
     here = _state(assembly, laws, _balance(assembly, laws, near=near))
-    over_turns: dict[str, list[_State]] = {}
+    over_turns: dict[str, list[_SupportState]] = {}
     for carrier in sorted({planets[0].carrier or "" for planets in _unequal(assembly)}):
         over_turns[carrier] = [here]
         for turn in 2.0 * math.pi / CARRIER_ANGLES * np.arange(1, CARRIER_ANGLES):
@@ -248,7 +250,7 @@ def _states(assembly: Assembly, laws: Sequence[SupportLaw], near: Floats) -> tup
 
 
 def _lasting_laws(
-    assembly: Assembly, laws: Sequence[SupportLaw], here: _State, over_turns: dict[str, list[_State]]
+    assembly: Assembly, laws: Sequence[SupportLaw], here: _SupportState, over_turns: dict[str, list[_SupportState]]
 ) -> tuple[ConnectorArrays, float]:
     """Connectors with the laws that last in motion, and how far bearings of equal planets were apart in stiffness."""
     bodies = _bodies(assembly)

@@ -15,7 +15,7 @@ from exugear.system.bodies.elastic_body import ElasticBody
 from exugear.system.build import assemble
 from exugear.system.modes import Modes, modes_of
 from exugear.system.system import Assembly
-from exugear.system.tooth_mesh.contact_state import ContactState
+from exugear.system.tooth_mesh.contact_state import MeshContactState
 from exugear.system.tooth_mesh.element import MeshData
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.display import ReprMixin
@@ -171,7 +171,7 @@ def assumed_parameters(
     ['axial inertia of hss / kg m²']
     """
 
-    def built(changes: Mapping[str, float], contact: Mapping[str, ContactState] | None = None) -> Assembly:
+    def built(changes: Mapping[str, float], contact: Mapping[str, MeshContactState] | None = None) -> Assembly:
         varied = gearbox.varied(changes)
         return assemble(varied, choice, stiffness, bodies_of(varied) if bodies_of else None, contact=contact)
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from exugear.results.run_file import Checkpoint, RunFile
+from exugear.results.run_file import RunCheckpoint, RunFile
 from exugear.system.signals import BALANCE_TERMS, ENERGIES, POWERS
 from exugear.transient.compiled.solver import Observer
 from exugear.transient.plan import RunPlan, buffer_rows
@@ -307,9 +307,9 @@ class Recorder:
         stride = max(1, round(FLUSH_INTERVAL / self._plan.step))
         return np.unique(np.append(np.arange(0, count, stride), count - 1))
 
-    def _checkpoint(self, time: float, rows: RowBuffer, past: Floats) -> Checkpoint:
+    def _checkpoint(self, time: float, rows: RowBuffer, past: Floats) -> RunCheckpoint:
         """Restart state: the last of these rows, at a time (s)."""
-        return Checkpoint(
+        return RunCheckpoint(
             step=round(time / self._plan.step),
             q=rows.q[-1],
             v=rows.v[-1],

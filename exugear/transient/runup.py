@@ -44,7 +44,7 @@ SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
 """Signals that end a run; the last two where the program that runs it listens to them itself."""
 
 
-class Interruption:
+class StopRequest:
     """Whether somebody asked to stop."""
 
     def __init__(self) -> None:
@@ -52,12 +52,12 @@ class Interruption:
 
 
 @contextmanager
-def interruptible() -> Iterator[Interruption]:
+def interruptible() -> Iterator[StopRequest]:
     """Take note of Ctrl-C instead of raising; a second one tears down.
 
     So do other signals by which the program that runs this has itself stopped. Only the main thread receives them.
     """
-    interruption = Interruption()
+    interruption = StopRequest()
     if threading.current_thread() is not threading.main_thread():
         yield interruption
         return
@@ -86,7 +86,7 @@ STEP_TOLERANCE = 1e-3
 """How far Exudyn's clock may be from the step that is due, in steps."""
 
 
-def integrate(plan: RunPlan, start: RunStart, recorder: Recorder, interruption: Interruption) -> None:
+def integrate(plan: RunPlan, start: RunStart, recorder: Recorder, interruption: StopRequest) -> None:
     """Integrate as planned; the recorder takes the states and any error."""
     if start.state.step >= plan.steps:  # a kill fell between the last step and the joining of the pieces
         recorder.last_time = start.state.step * plan.step
@@ -96,7 +96,7 @@ def integrate(plan: RunPlan, start: RunStart, recorder: Recorder, interruption: 
         _integrate_in_exudyn(plan, start, recorder, interruption)
 
 
-def _integrate_compiled(plan: RunPlan, start: RunStart, recorder: Recorder, interruption: Interruption) -> None:
+def _integrate_compiled(plan: RunPlan, start: RunStart, recorder: Recorder, interruption: StopRequest) -> None:
     """Let the compiled solver fill the recorder's buffer."""
     state = start.state
     step = plan.step
@@ -114,7 +114,7 @@ def _integrate_compiled(plan: RunPlan, start: RunStart, recorder: Recorder, inte
         done += good
 
 
-def _integrate_in_exudyn(plan: RunPlan, start: RunStart, recorder: Recorder, interruption: Interruption) -> None:
+def _integrate_in_exudyn(plan: RunPlan, start: RunStart, recorder: Recorder, interruption: StopRequest) -> None:
     """Let Exudyn hand over each state."""
     from exugear.transient.exudyn_model.library import SolverFailure
     from exugear.transient.exudyn_model.system import ExudynSystem
@@ -132,7 +132,7 @@ def _integrate_in_exudyn(plan: RunPlan, start: RunStart, recorder: Recorder, int
 class _StepFollower:
     """Observer of Exudyn's steps: the first call is the start itself."""
 
-    def __init__(self, plan: RunPlan, start: RunStart, recorder: Recorder, interruption: Interruption) -> None:
+    def __init__(self, plan: RunPlan, start: RunStart, recorder: Recorder, interruption: StopRequest) -> None:
         self._step = plan.step
         self._next = start.state.step
         self._begun = False

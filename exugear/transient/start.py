@@ -25,7 +25,7 @@ from exugear.results.run_file import (
     EARLIER_PARTIAL_NAME,
     FINAL_NAME,
     PARTIAL_NAME,
-    Checkpoint,
+    RunCheckpoint,
     RunPieces,
     has_pieces,
     kept_attributes,
@@ -111,7 +111,7 @@ class RunStart:
 
     loads: LoadTable
     """What acts from outside."""
-    state: Checkpoint
+    state: RunCheckpoint
     """State to start from."""
     pieces: RunPieces
     """What is written so far, and where the rest goes."""
@@ -169,7 +169,7 @@ def _pieces_to_resume(plan: RunPlan, layout: SignalLayout) -> RunPieces:
     return pieces
 
 
-def _take_over_judgement(plan: RunPlan, judge: ValidityMonitor, state: Checkpoint) -> None:
+def _take_over_judgement(plan: RunPlan, judge: ValidityMonitor, state: RunCheckpoint) -> None:
     judge.figures = state.judgement
     if judge.stop:
         reasons = judge.reasons(state.mesh_times, state.step * plan.step)
@@ -182,7 +182,7 @@ def _first_state(
     series: Mapping[str, tuple[Floats, Floats]],
     layout: SignalLayout,
     judge: ValidityMonitor,
-) -> Checkpoint:
+) -> RunCheckpoint:
     """State at the start in balance; a drive is ahead by the angle at which it carries its torque."""
     torques = {**case.torques, **{name: float(values[0]) for name, (_, values) in series.items()}}
     driven = None
@@ -192,7 +192,7 @@ def _first_state(
     start_angle = 0.0
     if case.driven_body is not None and case.drive_stiffness is not None:
         start_angle = float(balanced.q[assembly.spin[case.driven_body]]) + balanced.drive_torque / case.drive_stiffness
-    return Checkpoint(
+    return RunCheckpoint(
         step=0,
         q=balanced.q,
         v=balanced.v,

@@ -187,7 +187,7 @@ class NewtonSettings:
 
 
 @dataclass(frozen=True)
-class _State:
+class _EquilibriumState:
     displacement: Floats
     modes: Floats
     pressure: Floats
@@ -198,7 +198,7 @@ class _State:
 class _Evaluation:
     """A state with its forces, tangents and gaps."""
 
-    state: _State
+    state: _EquilibriumState
     bricks_force: Floats
     """(n, 3) internal forces of the bricks."""
     recovery: Floats
@@ -314,7 +314,7 @@ class _Numbering:
 
 
 @dataclass
-class _Search:
+class _EquilibriumSearch:
     """The search of one equilibrium."""
 
     model: ContactModel
@@ -389,7 +389,9 @@ class _Search:
         curvature[nodes, :2] = -turned / hub.lever**2
         return displacement, slope, curvature
 
-    def _moved(self, state: _State, step: Floats, recovery: Floats, length: float, pressure: Floats) -> _State:
+    def _moved(
+        self, state: _EquilibriumState, step: Floats, recovery: Floats, length: float, pressure: Floats
+    ) -> _EquilibriumState:
         """State after `length` times a step of the unknowns."""
         hub = state.hub
         displacement = state.displacement.copy()
@@ -401,14 +403,14 @@ class _Search:
             hub += length * float(step[-1])
             nodes = self.model.hub.nodes
             displacement[nodes] = self.hub_motion(hub)[0][nodes]
-        return _State(
+        return _EquilibriumState(
             displacement=displacement,
             modes=self.model.bricks.stepped_modes(state.modes, recovery, full_step, length),
             pressure=state.pressure + length * (pressure - state.pressure),
             hub=hub,
         )
 
-    def evaluate(self, state: _State, load: float) -> _Evaluation:
+    def evaluate(self, state: _EquilibriumState, load: float) -> _Evaluation:
         """Compute forces, tangents and gaps of a state under a part of the load."""
         model = self.model
         tangent = model.bricks.evaluate(state.displacement, state.modes)
@@ -436,7 +438,7 @@ class _Search:
             imbalance=reduced,
         )
 
-    def condensed_force(self, state: _State) -> Floats:
+    def condensed_force(self, state: _EquilibriumState) -> Floats:
         """Return the internal nodal forces (n, 3) of the condensed parts."""
         own = state.displacement - self.carried_motion(state.hub)[0]
         return np.asarray((self.numbering.condensed @ own.ravel()).reshape(-1, 3))
@@ -448,7 +450,7 @@ class _Search:
     def solve(self) -> Equilibrium:
         """Apply the load in steps."""
         bricks = self.model.bricks
-        state = _State(np.zeros_like(bricks.points), bricks.modes_at_rest(), np.zeros(len(self.area)), 0.0)
+        state = _EquilibriumState(np.zeros_like(bricks.points), bricks.modes_at_rest(), np.zeros(len(self.area)), 0.0)
         active = self._first_guess(1.0)
         reached = 0.0
         step = 1.0 / self.settings.load_steps
@@ -487,7 +489,9 @@ class _Search:
         gap = self._facing_gap(self.at_rest)
         return np.asarray(gap <= max(float(gap.min()), 0.0) + load * self.model.reach)
 
-    def _solve_step(self, state: _State, active: Booleans, load: float, number: int) -> tuple[_State, Booleans]:
+    def _solve_step(
+        self, state: _EquilibriumState, active: Booleans, load: float, number: int
+    ) -> tuple[_EquilibriumState, Booleans]:
         """Newton iterations of one load step."""
         load_step = f"load step {number} ({100 * load:.4g} % of the load)"
         try:
@@ -629,7 +633,7 @@ def solve_contact(
         in spite of halved load steps; the message names load step and iteration.
     """
     with one_dense_thread():
-        return _Search(model, settings or NewtonSettings(), report).solve()
+        return _EquilibriumSearch(model, settings or NewtonSettings(), report).solve()
 
 
 def fixed_body_displacement(model: ContactModel) -> tuple[Floats, Floats]:

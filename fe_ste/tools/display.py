@@ -14,7 +14,7 @@ TitledRows = tuple[str, Mapping[str, str]]
 """Title of a table, and name of each entry -> its value as text, with its unit."""
 
 
-class _Fields(Formatter):
+class _AttributeFormatter(Formatter):
     """Formats attributes of an object as strings format fields, and ``!n`` as the number of entries."""
 
     def __init__(self, owner: object) -> None:
@@ -72,7 +72,7 @@ class ReprMixin:
         return f"<p>{_shown(repr(self))}</p>"
 
     def _line(self) -> str:
-        return _Fields(self).format(self._stated_line)
+        return _AttributeFormatter(self).format(self._stated_line)
 
     def _table(self) -> TitledRows:
         return "", {}

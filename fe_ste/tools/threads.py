@@ -206,14 +206,14 @@ class Workers(ProcessPoolExecutor):
         return super().__exit__(kind, error, trace)
 
 
-class StoppedError(RuntimeError):
+class WorkerStoppedError(RuntimeError):
     """The process that started a worker wants its result no more."""
 
 
 def stop_if_asked() -> None:
     """End the work of a worker whose result is wanted no more; calls that take long ask between their steps."""
     if _asked is not None and _asked.is_set():
-        raise StoppedError
+        raise WorkerStoppedError
 
 
 _asked: Event | None = None

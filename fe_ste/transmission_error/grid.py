@@ -59,7 +59,7 @@ class GridError(RuntimeError):
     """A grid whose workers were lost; the message says what is kept."""
 
 
-class Submits(Protocol):
+class GridExecutor(Protocol):
     """What a grid asks of an executor."""
 
     def submit(self, fn: Callable[..., StateResults], /, *args: object) -> Future[StateResults]:
@@ -117,7 +117,7 @@ def solve_grid(
     compliance: PairCompliance,
     axes: StateAxes,
     *,
-    executor: Submits | None = None,
+    executor: GridExecutor | None = None,
     checkpoint: Checkpoint | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> xr.Dataset:
@@ -189,7 +189,7 @@ def _solved_here(
 
 
 def _solved_by_workers(
-    compliance: PairCompliance, axes: StateAxes, blocks: list[_Block], executor: Submits
+    compliance: PairCompliance, axes: StateAxes, blocks: list[_Block], executor: GridExecutor
 ) -> Iterator[tuple[_Block, StateResults]]:
     """Yield blocks in the order in which workers finish them."""
     packed = _packed(compliance)
@@ -207,7 +207,7 @@ def _solved_by_workers(
 
 
 @contextmanager
-def _cancelled_on_error(executor: Submits) -> Iterator[dict[Future[StateResults], _Block]]:
+def _cancelled_on_error(executor: GridExecutor) -> Iterator[dict[Future[StateResults], _Block]]:
     waiting: dict[Future[StateResults], _Block] = {}
     try:
         yield waiting

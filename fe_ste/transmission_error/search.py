@@ -166,7 +166,7 @@ def _searched(
     starts: list[SearchStart],
 ) -> list[ContactState | ContactError]:
     """Search the contact of one position on flanks that end as `kinematics` has it; parameters of `contact_states`."""
-    search = _Search(compliance, kinematics, torque, pmc, misalignments, starts)
+    search = _ContactSearch(compliance, kinematics, torque, pmc, misalignments, starts)
     for attempt in range(_WINDOW_ATTEMPTS):
         pending = search.pending()
         if not pending:
@@ -203,7 +203,7 @@ class _Window:
         return [[index] for index in self.near]
 
 
-class _Search:
+class _ContactSearch:
     """The search for the contact of one position under several misalignments."""
 
     def __init__(

@@ -31,7 +31,7 @@ from fe_ste.tools.threads import Workers
 from fe_ste.tools.versions import TABLE
 from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
 from fe_ste.transmission_error.diagrams import draw_table
-from fe_ste.transmission_error.grid import Checkpoint, Submits, solve_grid
+from fe_ste.transmission_error.grid import Checkpoint, GridExecutor, solve_grid
 from fe_ste.transmission_error.search import unloaded_states
 from fe_ste.transmission_error.states import CUT_OFF, RESULTS, STATE_AXES, StateAxes, cut_off_variable
 
@@ -129,7 +129,7 @@ class MeshTable(ReprMixin):
         wanted: TableInput,
         progress: Callable[[int, int], None] | None = None,
         *,
-        executor: Submits | None = None,
+        executor: GridExecutor | None = None,
         partial: Path | None = None,
     ) -> MeshTable:
         """Compute a table.

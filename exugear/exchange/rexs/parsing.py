@@ -21,10 +21,10 @@ from exugear.exchange.rexs.tree import (
     Addition,
     Attribute,
     Component,
-    LoadCase,
     Model,
     Relation,
     RexsError,
+    RexsLoadCase,
     Value,
     plain,
 )
@@ -423,7 +423,7 @@ def parse_model(content: bytes) -> Model:
     if errors:
         raise RexsError(*errors)
     cases = tuple(
-        LoadCase(
+        RexsLoadCase(
             number,
             {
                 _component_number(document, one): _attributes(document, one)

@@ -263,7 +263,7 @@ class Relation:
 
 
 @dataclass(frozen=True)
-class LoadCase:
+class RexsLoadCase:
     """Attributes that a load case replaces, by the number of their component."""
 
     number: int
@@ -280,13 +280,13 @@ class Model(ReprMixin, line=" REXS {version}: {components!n} components, {relati
     components: Mapping[int, Component]
     relations: tuple[Relation, ...]
     """Relations; ordered ones in their order."""
-    load_cases: tuple[LoadCase, ...] = ()
+    load_cases: tuple[RexsLoadCase, ...] = ()
 
     def components_of_type(self, *types: str) -> tuple[Component, ...]:
         """Return all components of some types, in the order of the file."""
         return tuple(component for component in self.components.values() if component.type in types)
 
-    def components_in(self, case: LoadCase | None, *types: str) -> list[Component]:
+    def components_in(self, case: RexsLoadCase | None, *types: str) -> list[Component]:
         """Return all components of some types with the attributes that a load case replaces; None for no load case."""
         changes = case.changes if case else {}
         parts = self.components_of_type(*types)

@@ -120,7 +120,7 @@ def _largest(samples: Samples, number: Integers) -> Samples:
 
 
 @dataclass(eq=False)
-class Pool:
+class SamplePool:
     """Files of one kind, with samples weighted by duration."""
 
     extreme: bool = False
@@ -152,7 +152,7 @@ class Pool:
         if sum(map(len, self._parts)) > 2 * max(MOST_POINTS, len(self._parts[0])):
             self._parts = [condensed(together(self._parts), self.extreme)]
 
-    def merge(self, other: Pool) -> None:
+    def merge(self, other: SamplePool) -> None:
         """Add the content of another pool."""
         parts = other._parts
         count = other.count
@@ -228,7 +228,7 @@ class SeriesReader:
         """Whether channels of rotor loads are specified."""
         return self.source.hub_forces is not None or self.source.hub_moments is not None
 
-    def take(self, path: Path, pool: Pool) -> ReadSummary:
+    def take(self, path: Path, pool: SamplePool) -> ReadSummary:
         """Read a file into a pool.
 
         Raises

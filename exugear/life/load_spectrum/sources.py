@@ -14,9 +14,9 @@ import numpy as np
 from exugear.exchange.channels import LoadFileError
 from exugear.exchange.rexs.containers import read_rexs
 from exugear.exchange.rexs.to_case.bodies import find_bodies
-from exugear.exchange.rexs.to_case.loads import Loads, loads_of
-from exugear.exchange.rexs.to_case.notes import Notes, Places
-from exugear.exchange.rexs.tree import LoadCase, Model, RexsError
+from exugear.exchange.rexs.to_case.loads import ImportedLoads, loads_of
+from exugear.exchange.rexs.to_case.notes import ComponentPositions, Notes
+from exugear.exchange.rexs.tree import Model, RexsError, RexsLoadCase
 from exugear.exchange.series_files import (
     LARGEST_SERIES,
     SERIES_ENDINGS,
@@ -35,7 +35,7 @@ from exugear.life.load_spectrum.series import (
     HUB_LOADS,
     LARGEST_SPEED,
     LARGEST_TORQUE,
-    Pool,
+    SamplePool,
     Samples,
     SeriesReader,
     together,
@@ -100,7 +100,7 @@ def rexs_load_cases(gearbox: Gearbox, path: Path, body: str) -> tuple[Floats, Fl
     notes = Notes()
     if not model.load_cases:
         raise RexsError(f"{path}: holds no load spectrum; expected load cases with their share of the time")
-    places = Places(model)
+    places = ComponentPositions(model)
     bodies = find_bodies(model, places, notes)
     notes.errors.tell()
     rows = []
@@ -114,7 +114,7 @@ def rexs_load_cases(gearbox: Gearbox, path: Path, body: str) -> tuple[Floats, Fl
     return torques, speeds, shares / shares.sum()
 
 
-def _speed(gearbox: Gearbox, loads: Loads, body: str, where: str) -> float:
+def _speed(gearbox: Gearbox, loads: ImportedLoads, body: str, where: str) -> float:
     """Return the speed of the body, rad/s, from that of any body of the train."""
     for name, speed in loads.speeds.items():
         if name == body or name in gearbox.spinning:
@@ -122,7 +122,7 @@ def _speed(gearbox: Gearbox, loads: Loads, body: str, where: str) -> float:
     raise RexsError(f"{where}: no rotational_speed of a shaft")
 
 
-def _share(model: Model, case: LoadCase, where: str) -> float:
+def _share(model: Model, case: RexsLoadCase, where: str) -> float:
     """Return the time fraction in percent; both the old and the new name of the attribute are accepted."""
     for unit in model.components_of_type("gear_unit"):
         share = unit.with_attributes(case.changes.get(unit.number, {})).quantity("operating_time_fraction", "%")
@@ -223,7 +223,7 @@ def load_sources(gearbox: Gearbox, progress: Progress | None = None) -> tuple[Lo
     done = 0
     drafts = []
     for name, source in loads.sources.items():
-        draft = _Draft(gearbox, loads, name, source)
+        draft = _SourceDraft(gearbox, loads, name, source)
         draft.take_stated()
         for path in paths[name]:
             if progress is not None:
@@ -309,13 +309,13 @@ def _paths(gearbox: Gearbox, key: str, source: SourceSection) -> list[Path]:
     return paths
 
 
-class _Draft:
+class _SourceDraft:
     """Source during reading: samples in pools of equal weight."""
 
     def __init__(self, gearbox: Gearbox, loads: LoadsSection, name: str, source: SourceSection) -> None:
         self.gearbox, self.loads, self.name, self.section = gearbox, loads, name, source
         self.key = f"loads.sources.{name}"
-        self.pools: dict[float, Pool] = {}
+        self.pools: dict[float, SamplePool] = {}
         self._reader = SeriesReader(gearbox, self.key, source, loads.body)
         self._digests: list[tuple[str, str]] = []
         self._table: Samples | None = None
@@ -352,7 +352,7 @@ class _Draft:
     def _take_series(self, path: Path) -> None:
         if self.section.kind == "fatigue" and not self._weighed:
             raise self.gearbox.error(f"{self.key}.hours_per_year: this key is missing; a time series requires it")
-        pool = Pool(self.section.kind == "extreme")
+        pool = SamplePool(self.section.kind == "extreme")
         taken = self._reader.take(path, pool)
         self._skipped = max(self._skipped, taken.skipped)
         group = 0.0
@@ -512,7 +512,7 @@ class _Draft:
             parts.append(Samples(samples.torque, samples.speed, lasting, samples.hub))
         return together(parts)
 
-    def _hours_of(self, group: float, pool: Pool, by_wind: Mapping[float, float]) -> float:
+    def _hours_of(self, group: float, pool: SamplePool, by_wind: Mapping[float, float]) -> float:
         """Return the hours of a pool per year."""
         section = self.section
         if section.kind == "extreme":
@@ -547,7 +547,7 @@ def _hours_in(row: Sequence[str]) -> float | None:
     return None
 
 
-def _wind_seconds(drafts: Sequence[_Draft]) -> dict[float, float]:
+def _wind_seconds(drafts: Sequence[_SourceDraft]) -> dict[float, float]:
     """Return the total length of the files of each wind speed bin over all sources, s."""
     seconds: dict[float, float] = {}
     for draft in drafts:

@@ -77,7 +77,7 @@ class ReportError(ValueError):
 
 
 @dataclass(frozen=True)
-class Notes:
+class ReportNotes:
     """Messages for the top and the end of the page, each list in order of occurrence."""
 
     statements: list[str] = field(default_factory=list)
@@ -100,7 +100,7 @@ class Context:
     """Target frequency for the search for modes, Hz."""
     tell: Callable[[str], None]
     """Callback for progress messages."""
-    notes: Notes = field(default_factory=Notes)
+    notes: ReportNotes = field(default_factory=ReportNotes)
     assemblies: dict[Choice, Assembly] = field(default_factory=dict)
     """Assembled models by model settings."""
     stiffnesses: dict[str, dict[str, Floats | MeshCurve | SteSurface]] = field(default_factory=dict)

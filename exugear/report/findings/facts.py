@@ -27,7 +27,7 @@ LEAST_SHIFT = 5e-4
 
 
 @dataclass(frozen=True)
-class Sensitivity:
+class FrequencySensitivity:
     """First-order sensitivity of a natural frequency to a stiffness or an inertia."""
 
     what: str
@@ -56,14 +56,14 @@ def shift_of(frequency: float, share: float, kind: str, step: float = STEP) -> f
     return frequency * (math.pow(1.0 + step * share, power) - 1.0)
 
 
-def sensitivities_of(words: Labels, modes: xr.Dataset, index: int) -> tuple[Sensitivity, ...]:
+def sensitivities_of(words: Labels, modes: xr.Dataset, index: int) -> tuple[FrequencySensitivity, ...]:
     """List sensitivities of a mode: stiffnesses, then inertias, each by effect; planets of a set vary together."""
     frequency = float(modes["frequency"][index])
     kinetic = modes["kinetic_energy_share"].isel(mode=index).sum("motion").to_numpy()
     bodies = words.gathered(dict(zip(map(str, modes["body"].to_numpy()), map(float, kinetic), strict=True)))
     parts = [("stiffness", words.strain_energy(modes, index)), ("inertia", bodies)]
     sensitivities = [
-        Sensitivity(what, kind, share, shift_of(frequency, share, kind))
+        FrequencySensitivity(what, kind, share, shift_of(frequency, share, kind))
         for kind, shares in parts
         for what, share in shares.items()
     ]
@@ -292,12 +292,12 @@ def _sensitivity(words: Labels, group: RunGroup, variations: Sequence[ModelVaria
     return SummaryCard("Sensitivity", shift_text(stiffest), f"for +10 % stiffness of {stiffest.what}", said, "change")
 
 
-def shift_text(sensitivity: Sensitivity) -> str:
+def shift_text(sensitivity: FrequencySensitivity) -> str:
     """Return the frequency shift of a sensitivity as text, with sign and unit.
 
     Examples
     --------
-    >>> shift_text(Sensitivity("carrier", "inertia", 0.4, -13.8))
+    >>> shift_text(FrequencySensitivity("carrier", "inertia", 0.4, -13.8))
     '−14 Hz'
     """
     sign = "−" if sensitivity.shift < 0.0 else "+"

@@ -32,7 +32,7 @@ from exugear.report.findings.context import (
 )
 from exugear.report.findings.ranking import (
     ConstantSpeed,
-    Highest,
+    OrderPeak,
     Ranking,
     highest_drawn,
     is_over_speed,
@@ -80,7 +80,7 @@ class RankedResonance:
     """Variants without this resonance, judged at its highest peak and with every window."""
     elsewhere: Mapping[str, float]
     """By variant, highest level (dB) of the other variants at its highest peak; NaN outside their speed range."""
-    constant: Highest | None
+    constant: OrderPeak | None
     """Its highest peak at constant speed; None without a steady-state response there."""
 
     @property

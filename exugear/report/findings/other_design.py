@@ -51,7 +51,7 @@ class OtherDesign:
 
 
 @dataclass(frozen=True)
-class Highest:
+class HighestAmplitude:
     """Highest amplitude of any order in the operating range."""
 
     amplitude: float
@@ -153,16 +153,16 @@ def _flat(content: Mapping[str, Any], place: str = "") -> dict[str, Any]:
     return found
 
 
-def highest_within(curve: Envelope, speeds: tuple[float, float]) -> Highest | None:
+def highest_within(curve: Envelope, speeds: tuple[float, float]) -> HighestAmplitude | None:
     """Return the highest amplitude of a curve within a range of speeds (rad/s); None if it has no speed there."""
     inside = (curve.speed >= speeds[0] * (1.0 - SAME_RANGE)) & (curve.speed <= speeds[1] * (1.0 + SAME_RANGE))
     if not inside.any():
         return None
     place = int(np.argmax(np.where(inside, curve.amplitude, -np.inf)))
-    return Highest(float(curve.amplitude[place]), float(curve.speed[place]))
+    return HighestAmplitude(float(curve.amplitude[place]), float(curve.speed[place]))
 
 
-def change_in_decibels(own: Highest, other: Highest) -> float:
+def change_in_decibels(own: HighestAmplitude, other: HighestAmplitude) -> float:
     """Return how much higher the amplitude of the other design is, dB; NaN where one is zero."""
     if own.amplitude <= 0.0 or other.amplitude <= 0.0:
         return math.nan

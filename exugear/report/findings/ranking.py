@@ -432,7 +432,7 @@ LEAST_SPEEDS = 3
 
 
 @dataclass(frozen=True)
-class Highest:
+class OrderPeak:
     """Highest point of an order at constant speed."""
 
     level: float
@@ -461,7 +461,7 @@ class ConstantSpeed:
             return None
         return self.level[:, place]
 
-    def near(self, line: OrderLine, frequency: float, resolution: float) -> Highest | None:
+    def near(self, line: OrderLine, frequency: float, resolution: float) -> OrderPeak | None:
         """Return the highest peak of an order within the resolution of a run-up around a frequency (both Hz).
 
         Without a peak, return the level at the frequency; None outside the speed range of the response. The band also
@@ -477,17 +477,17 @@ class ConstantSpeed:
         peaks = there[(along[there] > beside[there]) & (along[there] >= beside[there + 2])]
         nearest = there[np.argmin(np.abs(frequencies[there] - frequency))]
         index = int(peaks[np.argmax(along[peaks])] if peaks.size else nearest)
-        return Highest(float(along[index]), float(self.speed[index]), float(frequencies[index]))
+        return OrderPeak(float(along[index]), float(self.speed[index]), float(frequencies[index]))
 
-    def highest(self, lines: Iterable[OrderLine]) -> tuple[OrderLine, Highest] | None:
+    def highest(self, lines: Iterable[OrderLine]) -> tuple[OrderLine, OrderPeak] | None:
         """Return the order with the highest level and its maximum; None if the response contains none of the orders."""
-        found: list[tuple[OrderLine, Highest]] = []
+        found: list[tuple[OrderLine, OrderPeak]] = []
         for line in lines:
             along = self.along(line)
             if along is not None:
                 index = int(np.argmax(along))
                 frequency = float(line.frequency(self.speed[index : index + 1])[0])
-                found.append((line, Highest(float(along[index]), float(self.speed[index]), frequency)))
+                found.append((line, OrderPeak(float(along[index]), float(self.speed[index]), frequency)))
         return max(found, key=lambda own: own[1].level, default=None)
 
 

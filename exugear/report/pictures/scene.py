@@ -14,7 +14,7 @@ import scipy.linalg
 
 from exugear.gearbox.parts import seat_key
 from exugear.report.pictures.shapes import BodyShape, ModeScene, blank_discs, gear_surface, placed
-from exugear.system.bodies.reduction import ReducedBody, Surface
+from exugear.system.bodies.reduction import BodySurface, ReducedBody
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Floats, Integers, Pixels
 from fe_ste.tools.drawing import (
@@ -379,7 +379,7 @@ def elastic_scene(assembly: Assembly, shape: Floats, *, title: str = "", amplitu
     )
 
 
-def _half_behind(surface: Surface, axis: tuple[float, float]) -> Surface:
+def _half_behind(surface: BodySurface, axis: tuple[float, float]) -> BodySurface:
     """Return the faces of a surface that lie behind an axis along z, seen from `SIDE`."""
     behind = (surface.points[surface.quads].mean(axis=1)[:, :2] - axis) @ SIDE[:2] < 0.0
     return replace(surface, quads=surface.quads[behind], strain=surface.strain[behind])

@@ -29,7 +29,7 @@ TWIST_PER_LAYER = 0.06
 
 
 @dataclass(frozen=True)
-class Surface:
+class TriangleSurface:
     """Triangulated surface."""
 
     points: Floats
@@ -37,12 +37,12 @@ class Surface:
     triangles: Integers
     """(m, 3)"""
 
-    def moved(self, shift: ArrayLike) -> Surface:
+    def moved(self, shift: ArrayLike) -> TriangleSurface:
         """Return a translated copy."""
-        return Surface(self.points + np.asarray(shift, dtype=np.float64), self.triangles)
+        return TriangleSurface(self.points + np.asarray(shift, dtype=np.float64), self.triangles)
 
     @classmethod
-    def joined(cls, surfaces: Sequence[Surface]) -> Surface:
+    def joined(cls, surfaces: Sequence[TriangleSurface]) -> TriangleSurface:
         """Merge surfaces into one."""
         offsets = np.cumsum([0, *(len(surface.points) for surface in surfaces)])
         return cls(
@@ -51,7 +51,7 @@ class Surface:
         )
 
 
-def gear_surface(gear: Gear, angle: float = 0.0, rim_diameter: float | None = None) -> Surface:
+def gear_surface(gear: Gear, angle: float = 0.0, rim_diameter: float | None = None) -> TriangleSurface:
     """Return the surface of a whole gear with its teeth, about the z axis, with z = 0 in the middle of the face width.
 
     Parameters
@@ -77,7 +77,7 @@ def gear_surface(gear: Gear, angle: float = 0.0, rim_diameter: float | None = No
     plain = np.stack([_circle(rim, polar + twist * part, gear.face_width * part) for part in heights[[0, -1]]])
     # Walls extend around the axis; end faces join the teeth with the rim at the same polar angles.
     bands = [toothed, plain[::-1], np.stack([plain[0], toothed[0]]), np.stack([toothed[-1], plain[1]])]
-    return Surface.joined([_band(band) for band in bands])
+    return TriangleSurface.joined([_band(band) for band in bands])
 
 
 def _gear_outline(gear: Gear) -> Floats:
@@ -97,18 +97,18 @@ def _circle(radius: Floats | float, polar: Floats, height: float) -> Floats:
     return np.column_stack([radius * np.cos(polar), radius * np.sin(polar), np.full(polar.shape, height)])
 
 
-def _band(rings: Floats) -> Surface:
+def _band(rings: Floats) -> TriangleSurface:
     """Return closed bands between rings of equal numbers of points, shape (rings, points, 3)."""
     count, size = rings.shape[:2]
     point = np.arange(count * size).reshape(count, size)
     following = np.roll(point, -1, axis=1)
     corners = np.stack([point[:-1], following[:-1], following[1:], point[1:]], axis=-1).reshape(-1, 4)
-    return Surface(rings.reshape(-1, 3), np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]]))
+    return TriangleSurface(rings.reshape(-1, 3), np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]]))
 
 
 def tube_surface(
     diameter: float, start: float, end: float, bore: float = 0.0, centre: ArrayLike = (0.0, 0.0)
-) -> Surface:
+) -> TriangleSurface:
     """Return the surface of a shaft, disc or pin along z.
 
     Parameters
@@ -136,7 +136,7 @@ class BodyShape:
     name: str
     family: str
     """Common name of equal bodies, such as the planets of a set."""
-    surface: Surface
+    surface: TriangleSurface
     """In the frame of the gearbox, at rest."""
     reference: Floats
     """(3,) point whose displacement describes the body's motion: the centre of mass, m."""
@@ -175,7 +175,7 @@ def bodies_of(gearbox: Gearbox) -> tuple[BodyShape, ...]:
         parts += [disc for _, disc in blank_discs(gearbox, body).values()]
         if parts:
             reference = np.array([*body.axis, body.centre_of_mass_z])
-            shapes.append(BodyShape(body.name, body.family, Surface.joined(parts), reference, body.fixed))
+            shapes.append(BodyShape(body.name, body.family, TriangleSurface.joined(parts), reference, body.fixed))
     return tuple(shapes)
 
 
@@ -240,7 +240,7 @@ def _rim(gearbox: Gearbox, body: Body, gear: str) -> float | None:
     return None
 
 
-def _shaft(gearbox: Gearbox, body: Body) -> list[Surface]:
+def _shaft(gearbox: Gearbox, body: Body) -> list[TriangleSurface]:
     """Return a plain cylinder through the gears of a body, or the pieces of its stepped shape if it has none."""
     if not _has_shaft(body):
         shape = gearbox.case.bodies[body.family].shape
@@ -254,7 +254,7 @@ def _shaft(gearbox: Gearbox, body: Body) -> list[Surface]:
     return [shaft]
 
 
-def _pieces(shape: ShapeSection, body: Body) -> list[Surface]:
+def _pieces(shape: ShapeSection, body: Body) -> list[TriangleSurface]:
     """Return the pieces of a stepped shaft, a cone as the cylinder of its mean diameter."""
     pieces = []
     start = MM * shape.start_z_mm
@@ -267,7 +267,7 @@ def _pieces(shape: ShapeSection, body: Body) -> list[Surface]:
     return pieces
 
 
-def blank_discs(gearbox: Gearbox, body: Body) -> dict[str, tuple[float, Surface]]:
+def blank_discs(gearbox: Gearbox, body: Body) -> dict[str, tuple[float, TriangleSurface]]:
     """Return the blanks at seats of a stepped shaft without gear: position (m) and surface, by name of the seat.
 
     The surface is that of the solid disc with the mass and both moments of inertia of the blank, such as the inner
@@ -291,7 +291,7 @@ def blank_discs(gearbox: Gearbox, body: Body) -> dict[str, tuple[float, Surface]
     return discs
 
 
-def _carrier(gearbox: Gearbox, body: Body, planets: Sequence[Body]) -> list[Surface]:
+def _carrier(gearbox: Gearbox, body: Body, planets: Sequence[Body]) -> list[TriangleSurface]:
     """Return pins through the planets and a plate behind them, towards +z, that does not hide the planets."""
     parts = []
     for planet in planets:

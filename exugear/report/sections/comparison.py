@@ -6,10 +6,10 @@ import math
 from typing import Any
 
 from exugear.gearbox.units import RPM
-from exugear.report.findings.other_design import Difference, Highest, change_in_decibels, highest_within
+from exugear.report.findings.other_design import Difference, HighestAmplitude, change_in_decibels, highest_within
 from exugear.report.findings.ranking import Envelope
 from exugear.report.findings.words import QUANTITIES, rounded_text
-from exugear.report.sections.material import Axis, Curve, Part, ReportData
+from exugear.report.sections.material import ChartAxis, Curve, Part, ReportData
 from exugear.report.web.html import Cell, Figure, Table, render
 
 SHOWN_KEYS = 40
@@ -57,7 +57,9 @@ def comparison_section(material: ReportData) -> Part:
     return Part(html, title="Two designs", name="two-designs")
 
 
-def _row(material: ReportData, name: str, own: tuple[str, Highest], other: tuple[str, Highest]) -> dict[str, object]:
+def _row(
+    material: ReportData, name: str, own: tuple[str, HighestAmplitude], other: tuple[str, HighestAmplitude]
+) -> dict[str, object]:
     """Return a row of the table of amplitudes, and note it for the command line."""
     label = QUANTITIES[name]
     change = change_in_decibels(own[1], other[1])
@@ -81,7 +83,7 @@ def _figure(material: ReportData, name: str, own: tuple[str, Envelope], other: t
         for (design, curve), style in ((own, "thin"), (other, "line"))
     ]
     title = f"{label.title} ± / {label.unit}"
-    axes = [Axis(f"{material.input_words} speed / rpm"), Axis(f"± {label.unit}")]
+    axes = [ChartAxis(f"{material.input_words} speed / rpm"), ChartAxis(f"± {label.unit}")]
     return material.chart(
         f"compared-{name}", title, "Largest single order over speed.", f"{own[0]} and {other[0]}", curves, axes
     )

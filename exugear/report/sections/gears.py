@@ -9,7 +9,7 @@ import numpy as np
 
 from exugear.report.findings.context import HARMONICS, PairExcitation, excitations
 from exugear.report.findings.words import figure_text
-from exugear.report.sections.material import Axis, Curve, Part, ReportData
+from exugear.report.sections.material import ChartAxis, Curve, Part, ReportData
 from exugear.report.web.html import Cell, Table, render
 from exugear.system.bearings.rolling.rows import BearingError
 from exugear.system.operating_points import mesh_duties
@@ -30,7 +30,7 @@ def gears_section(material: ReportData) -> Part:
             "Deviation from the mean.",
             "; ".join(f"{material.words.of(own.pair)} {_swing(own):.2f} µm peak-to-peak" for own in found),
             curves,
-            [Axis("position in the mesh cycle"), Axis("transmission error / µm")],
+            [ChartAxis("position in the mesh cycle"), ChartAxis("transmission error / µm")],
         ),
         errors=Table([_row(material, own) for own in found], caption="Static transmission error", name="errors"),
         stresses=Table(_stress_rows(material, found), caption="Contact stresses", name="stresses"),

@@ -42,7 +42,7 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Axis:
+class ChartAxis:
     """Axis of a line chart."""
 
     label: str
@@ -94,7 +94,7 @@ class ReportData:
         hint: str,
         words: str,
         curves: Sequence[Curve],
-        axes: Sequence[Axis],
+        axes: Sequence[ChartAxis],
         marks: Sequence[tuple[float, str]] = (),
     ) -> Figure:
         """Add the data of a line chart to the page and return its frame.

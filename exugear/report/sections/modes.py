@@ -17,7 +17,7 @@ from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.headline import headline_of_group
 from exugear.report.findings.parameter_variations import best_change, track_mode
 from exugear.report.findings.words import figure_text, percentages
-from exugear.report.sections.material import Axis, Curve, Part, ReportData, model_name
+from exugear.report.sections.material import ChartAxis, Curve, Part, ReportData, model_name
 from exugear.report.web.document import rounded
 from exugear.report.web.html import Cell, Figure, Table, render
 from exugear.report.web.stage import stage_data
@@ -318,7 +318,7 @@ def _variation(material: ReportData, name: str, variation: ParameterVariation, f
             Curve("TE amplification", values, seen.amplification, "dashed", True),
             Curve("highest within one octave", values, seen.loudest, "thin", True),
         ],
-        [Axis(label, parameter.logarithmic), Axis("Hz"), Axis("amplification")],
+        [ChartAxis(label, parameter.logarithmic), ChartAxis("Hz"), ChartAxis("amplification")],
         [(parameter.default, "value used")],
     )
     return figure, f"{title}: {best}"

@@ -15,7 +15,7 @@ from exugear.gearbox.sections.entries import GROUND
 from exugear.gearbox.units import RPM
 from exugear.report.findings.context import METHOD_LABELS, Context, choice_of, model_label
 from exugear.report.findings.words import figure_text
-from exugear.report.sections.material import Axis, Curve, Part, ReportData, model_name
+from exugear.report.sections.material import ChartAxis, Curve, Part, ReportData, model_name
 from exugear.report.web.html import Figure, Table, render
 from exugear.results.run_file import read_run
 from exugear.results.spectra.resonances import MAX_SWEEP_RATIO, run_up_cut, sweep_rate, sweep_severity
@@ -128,7 +128,7 @@ def _order_charts(material: ReportData, data: xr.Dataset, runs: Sequence[Variant
             "",
             f"Overall transmission error along {material.words.line_sentence(line)}.",
             _curves(data, runs, line),
-            [Axis(f"{material.input_words} speed / rpm"), Axis("level / dB re 1 µm")],
+            [ChartAxis(f"{material.input_words} speed / rpm"), ChartAxis("level / dB re 1 µm")],
         )
         for number, line in enumerate(order_lines(material.context.gearbox, 2))
         if _place(data, line) is not None
@@ -190,7 +190,7 @@ def _campbell(material: ReportData, data: xr.Dataset, name: str, label: str) -> 
         "Horizontal lines: modes, by type. Dashed: mesh orders. Dots: excited crossings.",
         caption,
         curves,
-        [Axis(f"{material.input_words} speed / rpm"), Axis("frequency / Hz")],
+        [ChartAxis(f"{material.input_words} speed / rpm"), ChartAxis("frequency / Hz")],
     )
     rows = _mode_rows(material, diagram, data, crossings)
     texts = ("type", "strongest crossing", "mode shape")

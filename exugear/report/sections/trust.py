@@ -15,7 +15,7 @@ from exugear.gearbox.load_cases import static_load_in_words
 from exugear.gearbox.units import RPM
 from exugear.report.findings.context import METHOD_LABELS, choice_of, model_label
 from exugear.report.findings.result_checks import run_figures
-from exugear.report.sections.material import Axis, Curve, Part, ReportData, model_name
+from exugear.report.sections.material import ChartAxis, Curve, Part, ReportData, model_name
 from exugear.report.web.document import libraries, licences
 from exugear.report.web.html import Figure, Table, render
 from exugear.results.folder import times_spent
@@ -173,7 +173,7 @@ def _exudyn_comparison(material: ReportData, run: VariantRun) -> Figure | None:
         "Deviation from the mean of the Exudyn result.",
         found.words,
         [Curve("compiled solver", found.time, own), Curve("Exudyn", found.time, other, "dashed")],
-        [Axis("time / s"), Axis("overall transmission error / µm")],
+        [ChartAxis("time / s"), ChartAxis("overall transmission error / µm")],
     )
 
 

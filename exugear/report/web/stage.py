@@ -14,7 +14,7 @@ from exugear.gearbox.parts import seat_key
 from exugear.report.pictures.scene import DISPLACEMENT_COLOURS, body_colours
 from exugear.report.pictures.shapes import (
     BodyShape,
-    Surface,
+    TriangleSurface,
     blank_discs,
     bodies_of,
     gear_surface,
@@ -68,7 +68,7 @@ def _elastic(assembly: Assembly, colours: dict[str, str]) -> list[DrawnBody]:
         whole = quads[:, 2] != quads[:, 3]
         triangles = np.concatenate([quads[:, [0, 1, 2]], quads[whole][:, [0, 2, 3]]])
         centre = np.array([*body.axis, body.centre_of_mass_z])
-        shape = BodyShape(body.name, body.family, Surface(surface.points, triangles), centre, body.fixed)
+        shape = BodyShape(body.name, body.family, TriangleSurface(surface.points, triangles), centre, body.fixed)
         colour = colours.get(body.family, "#a0a8b0")
         drawn.append(DrawnBody(shape, colour, body.name, surface.displacement))
         for gear, z in {} if body.fixed else body.wheels.items():

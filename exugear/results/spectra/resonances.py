@@ -121,7 +121,7 @@ def _pick_at(
 
 
 @dataclass(frozen=True)
-class Resonance(ReprMixin, line=" {_frequency_text}, {_highest_text}, {picks!n} peaks"):
+class WaterfallResonance(ReprMixin, line=" {_frequency_text}, {_highest_text}, {picks!n} peaks"):
     """Peaks of several order lines at one frequency."""
 
     frequency: float
@@ -145,7 +145,7 @@ class Resonance(ReprMixin, line=" {_frequency_text}, {_highest_text}, {picks!n} 
         return f"highest {highest.level:.1f} dB on {shorten(highest.line.name, 80)}"
 
 
-def group_by_frequency(picks: Iterable[Pick]) -> tuple[Resonance, ...]:
+def group_by_frequency(picks: Iterable[Pick]) -> tuple[WaterfallResonance, ...]:
     """Group the peaks of several orders that belong to one resonance.
 
     Parameters
@@ -157,7 +157,7 @@ def group_by_frequency(picks: Iterable[Pick]) -> tuple[Resonance, ...]:
     by frequency. Starting with the highest, each peak is grouped with those within the larger of both resolutions.
     """
     waiting = sorted(picks, key=lambda pick: -pick.level)
-    groups: list[Resonance] = []
+    groups: list[WaterfallResonance] = []
     while waiting:
         highest = waiting[0]
         members = [pick for pick in waiting if _are_indistinct(highest, pick)]
@@ -165,7 +165,7 @@ def group_by_frequency(picks: Iterable[Pick]) -> tuple[Resonance, ...]:
         weights = np.array([pick.resolution**-2 for pick in members])
         frequencies = np.array([pick.frequency for pick in members])
         groups.append(
-            Resonance(
+            WaterfallResonance(
                 frequency=float(weights @ frequencies / weights.sum()),
                 resolution=min(pick.resolution for pick in members),
                 picks=tuple(members),
@@ -179,7 +179,7 @@ def _are_indistinct(first: Pick, second: Pick) -> bool:
 
 
 def match_eigenfrequencies(
-    resonances: Sequence[Pick | Resonance], eigenfrequencies: ArrayLike
+    resonances: Sequence[Pick | WaterfallResonance], eigenfrequencies: ArrayLike
 ) -> tuple[int | None, ...]:
     """Assign an eigenfrequency to each resonance.
 

@@ -18,7 +18,7 @@ from exugear.results.run_file import read_run as read_arrays
 from exugear.results.spectra.diagrams import draw_highest_levels
 from exugear.results.spectra.resonances import (
     Pick,
-    Resonance,
+    WaterfallResonance,
     group_by_frequency,
     match_eigenfrequencies,
     peaks_on_line,
@@ -199,7 +199,7 @@ def run_waterfall(path: str | Path, window_length: float | None = None) -> Water
 class Finding:
     """A resonance of a run-up and its eigenmode."""
 
-    resonance: Resonance
+    resonance: WaterfallResonance
     """Peaks of one or several orders at one frequency, the highest first."""
     mode: int | None
     """Index, from 0, of the nearest eigenfrequency with sufficient TE participation, if one is within the resolution.
@@ -276,7 +276,7 @@ class VariantRun(ReprMixin):
     def _seen_modes(modes: xr.Dataset) -> Integers:
         return np.flatnonzero(mobility_shares(modes) >= LEAST_SHARE)
 
-    def _finding(self, resonance: Resonance, mode: int | None) -> Finding:
+    def _finding(self, resonance: WaterfallResonance, mode: int | None) -> Finding:
         if mode is None or self.modes is None:
             return Finding(resonance, None, math.nan, "")
         return Finding(resonance, mode, float(self.modes["frequency"][mode]), str(self.modes["name"].to_numpy()[mode]))

@@ -476,7 +476,7 @@ class Terms(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Coupling:
+class HarmonicCoupling:
     """Products of the signals of some groups with functions of the bases' angles, as maps of lines."""
 
     lines: LineSet

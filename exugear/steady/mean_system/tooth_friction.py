@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exugear.steady.harmonics.lines import Coupling, LineSet, fourier_coefficients
+from exugear.steady.harmonics.lines import HarmonicCoupling, LineSet, fourier_coefficients
 from exugear.steady.mean_system.mesh_places import MeshInterface, coupled, families, group_of
 from exugear.steady.mean_system.mesh_waves import MeshWaves
 from exugear.steady.mean_system.rotating_frame import SteadyError
@@ -71,7 +71,9 @@ def tooth_friction(waves: MeshWaves, lines: LineSet, ports: MeshInterface, speed
     everywhere = np.zeros((len(lines.index), len(elements), FRICTION_PARTS), dtype=complex)
     everywhere[0, :, 0] = [wave.wave == 0 for wave in waves.waves]
     kinds = families(waves)
-    coupling = Coupling(lines, tuple(group_of(own, harmonics, FRICTION_PARTS, lines.index.shape[1]) for own in kinds))
+    coupling = HarmonicCoupling(
+        lines, tuple(group_of(own, harmonics, FRICTION_PARTS, lines.index.shape[1]) for own in kinds)
+    )
     functions = [coupled(waves, own, spectra, ports, speed, FRICTION_PARTS) for own in kinds]
     forces = coupling.of(functions, everywhere.reshape(len(everywhere), -1))
     return np.asarray(forces @ weighted.reshape(-1, weighted.shape[2]))

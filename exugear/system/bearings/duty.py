@@ -148,7 +148,7 @@ the third power of the load."""
 
 
 @dataclass(frozen=True)
-class Ratings:
+class LoadRatings:
     """Load ratings of a bearing, N."""
 
     dynamic: float
@@ -199,7 +199,7 @@ class BearingLoadState:
     element_load: float
     pressure: float
     """Load (N) and contact pressure at the inner ring (Pa) of the most loaded rolling element."""
-    ratings: Ratings
+    ratings: LoadRatings
     basic_life: float
     reference_life: float
     """L10 to ISO 281 and L10r to ISO/TS 16281 (basic: lubricant and cleanliness neglected), million revolutions;
@@ -208,7 +208,7 @@ class BearingLoadState:
     """What a reader should know before trusting the row."""
 
 
-def ratings_of(section: CatalogueSection) -> Ratings:
+def ratings_of(section: CatalogueSection) -> LoadRatings:
     """Load ratings of catalogue bearings: from the file, the minimum of manufacturers' catalogues, or to ISO.
 
     Ratings to ISO 281 and ISO 76 follow from the internal geometry of the bearing. Where that is estimated, they are
@@ -226,11 +226,11 @@ def ratings_of(section: CatalogueSection) -> Ratings:
         computed = computed[0] / dynamic_margin, computed[1] / static_margin
     dynamic, static = (own if stated is None else KN * stated for own, stated in zip(computed, given, strict=True))
     if None not in given:
-        return Ratings(dynamic, static, estimated=False)
+        return LoadRatings(dynamic, static, estimated=False)
     if known is None:
-        return Ratings(dynamic, static, estimated=True)
+        return LoadRatings(dynamic, static, estimated=True)
     designs = _two_designs(section, known) * (section.dynamic_rating_kN is None)
-    return Ratings(dynamic, static, estimated=False, makers=known.makers, two_designs=designs)
+    return LoadRatings(dynamic, static, estimated=False, makers=known.makers, two_designs=designs)
 
 
 def _two_designs(section: CatalogueSection, taken: KnownRating) -> str:
@@ -307,7 +307,7 @@ def _largest_load(state: BearingState) -> float:
     return max(float(state.element_load[begin:end].max()) for row, begin, end in of_rows if not is_rib(row))
 
 
-def _remarks(point: OperatingPoint, ratings: Ratings, reaction: Floats | None) -> list[str]:
+def _remarks(point: OperatingPoint, ratings: LoadRatings, reaction: Floats | None) -> list[str]:
     section = point.bearing.catalogue
     rows = point.rows
     assert section is not None

@@ -76,7 +76,7 @@ class Blank:
 
 
 @dataclass(frozen=True)
-class Surface:
+class BodySurface:
     """The surface of a reduced body for pictures."""
 
     points: Floats
@@ -137,7 +137,7 @@ class ReducedBody(
     """Where the coordinates are seen from: a frame that does not turn, the carrier's, or the ground."""
     modal_groups: tuple[str, ...]
     """What each modal coordinate describes: bending x, bending y, torsion or stretching; of a solid mesh,. inner."""
-    surface: Surface
+    surface: BodySurface
     """For pictures."""
     summary: ReductionSummary
     """What the reduction took and which modes it kept."""
@@ -535,6 +535,6 @@ def _from_arrays(arrays: Mapping[str, NDArray[Any]]) -> ReducedBody:
         **{name: arrays[name] for name in _MATRICES},
         frame=words["frame"],
         modal_groups=tuple(words["groups"]),
-        surface=Surface(**{name: arrays[name] for name in _SURFACE}),
+        surface=BodySurface(**{name: arrays[name] for name in _SURFACE}),
         summary=ReductionSummary(**summary),
     )

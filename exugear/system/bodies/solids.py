@@ -43,6 +43,7 @@ from exugear.system.bodies.lazy import lazy_import
 from exugear.system.bodies.reduction import (
     ELASTIC,
     Blank,
+    BodySurface,
     Frame,
     ReducedBody,
     ReducedComponent,
@@ -50,7 +51,6 @@ from exugear.system.bodies.reduction import (
     ReductionSummary,
     RigidInertia,
     Seat,
-    Surface,
     load_or_reduce,
     reduce_component,
     rigid_gyroscopic_matrix,
@@ -287,7 +287,7 @@ def _check_revolution(model: SolidModel, component: ReducedComponent) -> None:
             )
 
 
-def _surface(model: SolidModel, reduced: ReducedSolid) -> Surface:
+def _surface(model: SolidModel, reduced: ReducedSolid) -> BodySurface:
     """Boundary of the mesh with displacement, and strain at the centre of the adjacent element, per coordinate."""
     mesh = reduced.solid.mesh
     modes = reduced.component.component_modes
@@ -310,7 +310,7 @@ def _surface(model: SolidModel, reduced: ReducedSolid) -> Surface:
     shear = modulus / (2.0 * (1.0 + ratio))
     elasticity = np.diag([2.0 * shear] * 3 + [shear] * 3)
     elasticity[:3, :3] += modulus * ratio / ((1.0 + ratio) * (1.0 - 2.0 * ratio))
-    return Surface(
+    return BodySurface(
         points=np.asarray(mesh.doflocs)[:, nodes].T,
         quads=faces.reshape(corners.shape).astype(np.int64),
         displacement=by_node[nodes].astype(np.float32),

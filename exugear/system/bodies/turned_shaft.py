@@ -20,12 +20,12 @@ from exugear.system.bodies.reduction import (
     UY,
     UZ,
     Blank,
+    BodySurface,
     ReducedBody,
     ReducedComponent,
     ReductionError,
     ReductionSummary,
     Seat,
-    Surface,
     load_or_reduce,
     reduce_component,
     selective_mass_scaling,
@@ -99,7 +99,7 @@ def reduce_shaft(model: ShaftModel) -> ReducedBody:
         component = reduce_component(h.mass, h.stiffness, h.seats, h.rigid, _blank_masses(model, name), model.band)
         mass, mass_scaled[name] = selective_mass_scaling(component.mass, component.stiffness, model.limit)
         components[name] = replace(component, mass=mass)
-    layout = _Layout(len(seats), {name: c.component_modes.shape[1] for name, c in components.items()})
+    layout = _HarmonicLayout(len(seats), {name: c.component_modes.shape[1] for name, c in components.items()})
     gyroscopic = _gyroscopic(model, harmonics["bending"], components["bending"])
     spin = np.zeros(layout.size)
     spin[SPIN : 6 * len(seats) : 6] = 1.0
@@ -154,7 +154,7 @@ def _gyroscopic(model: ShaftModel, bending: Harmonic, component: ReducedComponen
     return symmetric(doubled)
 
 
-class _Layout:
+class _HarmonicLayout:
     """Indices of the coordinates of each harmonic among those of the body."""
 
     def __init__(self, seats: int, sizes: Mapping[HarmonicName, int]) -> None:
@@ -213,8 +213,8 @@ def _surface(
     shaft: Shaft,
     origin: tuple[float, float, float],
     components: Mapping[HarmonicName, ReducedComponent],
-    layout: _Layout,
-) -> Surface:
+    layout: _HarmonicLayout,
+) -> BodySurface:
     """Turn the outline of the half-section into a surface with displacement and strain per coordinate."""
     outline = shaft.outline()
     angle = 2.0 * np.pi * np.arange(ANGLES) / ANGLES
@@ -239,7 +239,7 @@ def _surface(
             u_r, u_phi, u_z = np.moveaxis(weights[:, None, :, None] * moved * sign, 2, 0)
             displacement[..., index] = np.stack([u_r * c - u_phi * s, u_r * s + u_phi * c, u_z], axis=2)
             strain[..., index] = face_weights[:, None, :, None] * strained * sign
-    return Surface(
+    return BodySurface(
         points=points.reshape(-1, 3) + np.array(origin),
         quads=np.stack(corners, axis=2).reshape(-1, 4).astype(np.int64),
         displacement=displacement.reshape(-1, 3, layout.size),

@@ -52,12 +52,12 @@ class ContactCycle:
 
 
 @dataclass(frozen=True)
-class ContactState:
+class MeshContactState:
     """Contact of a mesh at one load and misalignment, as mean over the mesh cycle.
 
     Examples
     --------
-    >>> state = ContactState(50e3, 20e-6, 2.6e9, 1e-4, -2e-3, -1.9e-3, 2e5)
+    >>> state = MeshContactState(50e3, 20e-6, 2.6e9, 1e-4, -2e-3, -1.9e-3, 2e5)
     >>> state.seen_by(-1).load_centroid, state.seen_by(-1).misalignment
     (0.002, -0.0001)
     """
@@ -83,7 +83,7 @@ class ContactState:
     cycle: ContactCycle | None = None
     """Variation over the mesh cycle, if known."""
 
-    def seen_by(self, flank: int) -> ContactState:
+    def seen_by(self, flank: int) -> MeshContactState:
         """Take the state from the axes of a table to those of a mesh with this flank, or back.
 
         The flank -1 is that of the table turned about the line of centres: the ends of the face change places.
@@ -136,7 +136,7 @@ def changed_over_cycle(known: Floats, samples: Samples) -> Floats:
     return np.asarray(known + size * np.fft.irfft(spectrum, size))
 
 
-def even_contact(pair: GearPair, force: float, stiffness: float, tangent_stiffness: float) -> ContactState:
+def even_contact(pair: GearPair, force: float, stiffness: float, tangent_stiffness: float) -> MeshContactState:
     """Return the contact of teeth of uniform stiffness and even load along the common face, so that kg = k b^2 / 12.
 
     Parameters
@@ -146,7 +146,7 @@ def even_contact(pair: GearPair, force: float, stiffness: float, tangent_stiffne
         Load over deflection, and the slope of the load, which resists a tilt at constant load, N/m.
     """
     tilt_stiffness = tangent_stiffness * pair.face_width**2 / 12.0
-    return ContactState(force, force / stiffness, tangent_stiffness, 0.0, 0.0, 0.0, tilt_stiffness)
+    return MeshContactState(force, force / stiffness, tangent_stiffness, 0.0, 0.0, 0.0, tilt_stiffness)
 
 
 # Contact of meshes at the places where their gears stand under the static load, by finite elements
@@ -177,7 +177,7 @@ class StaticContacts:
     """By mesh name, why there is none."""
 
     @property
-    def states(self) -> dict[str, ContactState]:
+    def states(self) -> dict[str, MeshContactState]:
         """Values for the mesh model, by mesh, in the axes of the pairs' tables."""
         return {name: contact_state(contact) for name, contact in self.contacts.items()}
 
@@ -232,7 +232,7 @@ def static_contacts(places: Mapping[str, MeshPlace], positions: int = POSITIONS)
     )
 
 
-def contact_state(contact: MeanContact) -> ContactState:
+def contact_state(contact: MeanContact) -> MeshContactState:
     """Return the values of a contact for a mesh model: at the middle of its misalignments, equal for nearby states."""
     middle = float(contact.misalignment.mean())
     deflection, stiffness, centre, tangent_centre = (
@@ -245,7 +245,7 @@ def contact_state(contact: MeanContact) -> ContactState:
         contact.cycle_load_centroid,
         contact.cycle_tangent_load_centroid,
     )
-    return ContactState(
+    return MeshContactState(
         force=contact.force,
         deflection=deflection,
         tangent_stiffness=stiffness,

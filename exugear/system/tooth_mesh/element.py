@@ -39,7 +39,7 @@ from exugear.gearbox.parts import Body, Mesh, node_position, seat_key
 from exugear.gearbox.sections.entries import GROUND
 from exugear.system.kernels.coordinates import BODY_SIZE
 from exugear.system.kernels.meshes import periodic_cubic
-from exugear.system.tooth_mesh.contact_state import ContactState, changed_over_cycle, even_contact
+from exugear.system.tooth_mesh.contact_state import MeshContactState, changed_over_cycle, even_contact
 from exugear.system.tooth_mesh.placement import (
     MeshError,
     friction_rows,
@@ -207,7 +207,7 @@ class MeshElement:
     where the law is a straight line."""
     load: float
     """At which they are, on the transverse line of action, N."""
-    contact: ContactState | None
+    contact: MeshContactState | None
     """How the teeth resist misalignment, in the axes of the mesh; None of a law in which they do not."""
     damping: float
     """N s/m, in the law's own coordinate."""
@@ -237,7 +237,7 @@ class MeshElement:
     friction_coefficient: float = 0.0
     """Coefficient of friction of the teeth in runs and steady-state responses."""
 
-    def with_contact(self, contact: ContactState) -> MeshElement:
+    def with_contact(self, contact: MeshContactState) -> MeshElement:
         """Return the mesh, so far with even load, with the results of a solved contact, in the axes of its table.
 
         The mean stiffness of a curved model is then that of the contact, and so are its variation over the mesh cycle
@@ -273,7 +273,7 @@ class MeshElement:
             offset=self.offset - np.array([shift + gap, 0.0, 0.0]),
         )
 
-    def _samples_over_cycle(self, contact: ContactState, yielding: float) -> tuple[Floats, Floats, Floats]:
+    def _samples_over_cycle(self, contact: MeshContactState, yielding: float) -> tuple[Floats, Floats, Floats]:
         """Secant and tangent stiffness (n,), N/m, and axial shifts of the load (2, n), m, at the gear positions."""
         cycle = contact.cycle
         if cycle is None:
@@ -318,7 +318,7 @@ def mesh_elements(
     angles: Angles = "reference",
     displaced: Mapping[str, tuple[float, float]] | None = None,
     nodes: Mapping[str, Floats] | None = None,
-    contact: Mapping[str, ContactState] | None = None,
+    contact: Mapping[str, MeshContactState] | None = None,
 ) -> tuple[MeshElement, ...]:
     """Return the elements of all meshes.
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.tooth_mesh.contact_state import ContactState
+from exugear.system.tooth_mesh.contact_state import MeshContactState
 from exugear.system.tooth_mesh.element import MeshCurve
 
 LOADS = {"sun_planet": 140e3, "ring_planet": 140e3, "intermediate": 180e3, "high_speed": 50e3}
@@ -29,12 +29,12 @@ def curves_of(stiffness: Mapping[str, np.ndarray]) -> dict[str, MeshCurve]:
     }
 
 
-def contacts(gearbox: Gearbox) -> dict[str, ContactState]:
+def contacts(gearbox: Gearbox) -> dict[str, MeshContactState]:
     """States whose numbers are of the size that contact of the GRC has, no two meshes alike."""
     found = {}
     for n, mesh in enumerate(gearbox.meshes):
         force = 1e5 * (1.0 + 0.1 * n)
-        found[mesh.name] = ContactState(
+        found[mesh.name] = MeshContactState(
             force, 30e-6 + 1e-6 * n, 6e9, 1e-4 - 3e-5 * n, -2e-3 + 4e-4 * n, 3e-3 - 7e-4 * n, 1e7 + 1e6 * n
         )
     return found

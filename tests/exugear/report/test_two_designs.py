@@ -13,7 +13,7 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.report.findings.other_design import Highest, change_in_decibels, differing_keys, highest_within
+from exugear.report.findings.other_design import HighestAmplitude, change_in_decibels, differing_keys, highest_within
 from exugear.report.findings.ranking import Envelope
 from exugear.results.folder import keep_case
 from exugear.steady.settings import SpeedRange, SteadySettings
@@ -116,10 +116,10 @@ def test_differing_keys_are_those_that_change_results(grc: Gearbox) -> None:
 
 def test_highest_amplitudes_are_of_the_range_and_zero_has_no_decibels() -> None:
     curve = Envelope(np.array([1.0, 2.0, 3.0]), np.array([9.0, 4.0, 5.0]))
-    assert highest_within(curve, (1.5, 3.0)) == Highest(5.0, 3.0)
+    assert highest_within(curve, (1.5, 3.0)) == HighestAmplitude(5.0, 3.0)
     assert highest_within(curve, (4.0, 5.0)) is None
-    assert change_in_decibels(Highest(1.0, 1.0), Highest(10.0, 2.0)) == pytest.approx(20.0)
-    assert math.isnan(change_in_decibels(Highest(0.0, 1.0), Highest(1.0, 1.0)))
+    assert change_in_decibels(HighestAmplitude(1.0, 1.0), HighestAmplitude(10.0, 2.0)) == pytest.approx(20.0)
+    assert math.isnan(change_in_decibels(HighestAmplitude(0.0, 1.0), HighestAmplitude(1.0, 1.0)))
 
 
 def case_in(folder: Path) -> Path:

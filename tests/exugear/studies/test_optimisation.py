@@ -7,7 +7,7 @@ import pytest
 
 from exugear.studies.dataset import EVALUATION, is_pareto_optimal
 from exugear.studies.executors import processes
-from exugear.studies.quantities import QUANTITIES, Quantity
+from exugear.studies.quantities import QUANTITIES, OutputKind
 from exugear.studies.runner import optimise
 from exugear.studies.study import Study
 
@@ -22,7 +22,7 @@ def distance(results, *, of: float) -> float:
     return (case.housing.factor - of) ** 2 + (1e6 * case.damping.mesh_time_s - 3.0) ** 2
 
 
-KNOWN = {**QUANTITIES, "distance": Quantity(distance, "1")}
+KNOWN = {**QUANTITIES, "distance": OutputKind(distance, "1")}
 
 
 def searched(folder, *minimise, **settings):

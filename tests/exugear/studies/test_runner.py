@@ -23,9 +23,9 @@ from exugear.studies.dataset import load_study
 from exugear.studies.executors import (
     ExecutorError,
     Journal,
+    PointInput,
     Pool,
     Record,
-    Work,
     compute_batch,
     given,
     processes,
@@ -192,7 +192,7 @@ class Breaking:
 
 def test_a_point_that_kills_every_worker_is_given_up_and_no_other_is_blamed(tmp_path):
     study = small_study(tmp_path)
-    points = [Work(name, point.changes) for name, point in study.hashed_points()]
+    points = [PointInput(name, point.changes) for name, point in study.hashed_points()]
     breaking = Breaking(points[3].point)
 
     @contextmanager
@@ -292,6 +292,6 @@ def test_a_run_that_was_stopped_is_gone_on_with(tmp_path, monkeypatch):
 
     monkeypatch.setattr("exugear.studies.point_results.stop_if_asked", stop_once)
     with pytest.raises(executors.StoppedError):
-        compute_batch(task, [Work(name, point.changes)])
+        compute_batch(task, [PointInput(name, point.changes)])
     again = run_study(study, tmp_path / "again", HERE)
     xr.testing.assert_identical(figures_of(again.dataset), figures_of(whole.dataset))

@@ -12,7 +12,7 @@ import pytest
 from exugear.studies.dataset import EVALUATION, beyond, load_study
 from exugear.studies.executors import processes
 from exugear.studies.pictures import draw_study
-from exugear.studies.quantities import QUANTITIES, Quantity
+from exugear.studies.quantities import QUANTITIES, OutputKind
 from exugear.studies.runner import optimise
 from exugear.studies.sampling import percentile_of
 from exugear.studies.sections import StudyError
@@ -57,12 +57,12 @@ def depth(results) -> float:
 
 
 KNOWN = {
-    "depth": Quantity(depth, "1"),
+    "depth": OutputKind(depth, "1"),
     **QUANTITIES,
-    "place": Quantity(place, "1"),
-    "wall": Quantity(wall, "1"),
-    "endless": Quantity(endless, "1"),
-    "failing": Quantity(failing, "1"),
+    "place": OutputKind(place, "1"),
+    "wall": OutputKind(wall, "1"),
+    "endless": OutputKind(endless, "1"),
+    "failing": OutputKind(failing, "1"),
 }
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from fe_ste.tools.threads import StoppedError, Workers, stop_if_asked
+from fe_ste.tools.threads import Workers, WorkerStoppedError, stop_if_asked
 
 pytestmark = pytest.mark.usefixtures("terminal_signals")
 ROOT = Path(__file__).parents[3]
@@ -76,7 +76,7 @@ def test_an_error_stops_the_work_and_drops_what_waits() -> None:
             time.sleep(0.01)
         raise KeyboardInterrupt
     assert time.monotonic() - begin < 60.0
-    assert isinstance(running.exception(), StoppedError)
+    assert isinstance(running.exception(), WorkerStoppedError)
     assert waiting[-1].cancelled()
 
 

@@ -53,7 +53,7 @@ _UNFIT = (GearboxFileError, MeshError, VariantError, BearingError, BalanceError,
 
 
 @dataclass
-class StoredResults:
+class ResultsForExport:
     """Results stored in a results folder."""
 
     gearbox: Gearbox
@@ -527,7 +527,7 @@ def with_results(gearbox: Gearbox, folder: Path, path: str | Path, rules: Rules 
     imported = to_case(model, Path(path).name, rules=rules)
     check_same_gears(gearbox, imported.gearbox)
     results = Results(gearbox, model, origins_of(imported.found), _static_load_case(gearbox, model))
-    stored = StoredResults(gearbox, folder)
+    stored = ResultsForExport(gearbox, folder)
     unit = next((part.number for part in model.components_of_type("gear_unit")), next(iter(model.components)))
     results.put_named(unit, f"{OWN}program", "none", f"exugear {exugear.__version__}")
     results.put_named(unit, f"{OWN}case", "none", gearbox.name)

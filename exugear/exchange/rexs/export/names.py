@@ -10,7 +10,7 @@ from exugear.exchange.rexs.mapping import BEARINGS, GEARS, OWN, RESULTS, Version
 from exugear.exchange.rexs.to_case.bodies import ends
 from exugear.exchange.rexs.to_case.conversion import Found
 from exugear.exchange.rexs.to_case.gear_blocks import Teeth, first_of_planets
-from exugear.exchange.rexs.to_case.notes import Block, Places
+from exugear.exchange.rexs.to_case.notes import Block, ComponentPositions
 from exugear.exchange.rexs.to_case.supports import PLACE_TOLERANCE
 from exugear.exchange.rexs.tree import Component, Model
 from exugear.gearbox.units import MM
@@ -147,5 +147,5 @@ def _bearings(found_in: Found, block: Block) -> tuple[int, ...]:
     return (component.number, *(number for _, number in sorted(found)))
 
 
-def _z(places: Places, part: Component) -> float:
+def _z(places: ComponentPositions, part: Component) -> float:
     return places.position(part)[2]

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from exugear.exchange.rexs.mapping import GEARS, JOINING, READ
-from exugear.exchange.rexs.to_case.notes import Notes, Places
+from exugear.exchange.rexs.to_case.notes import ComponentPositions, Notes
 from exugear.exchange.rexs.tree import Component, Model, RexsError
 from fe_ste.tools.display import ReprMixin
 
@@ -21,7 +21,7 @@ COAXIAL = 2e-3
 
 
 @dataclass(frozen=True)
-class Body:
+class RigidGroup:
     """Components that move as one rigid body."""
 
     name: str
@@ -50,10 +50,10 @@ class Body:
         return self.parts_of_type(*GEARS)
 
 
-class Bodies(ReprMixin):
+class RigidGroups(ReprMixin):
     """All bodies of a gearbox, by name and by component."""
 
-    def __init__(self, members: Sequence[Body]) -> None:
+    def __init__(self, members: Sequence[RigidGroup]) -> None:
         self.members = tuple(members)
         self._of_part = {part.number: body for body in members for part in body.parts}
         self._of_other = {part.number: body for body in members for each in body.others for part in each}
@@ -61,11 +61,11 @@ class Bodies(ReprMixin):
     def _line(self) -> str:
         return f": {', '.join(body.name for body in self.members)}"
 
-    def of(self, part: Component) -> Body | None:
+    def of(self, part: Component) -> RigidGroup | None:
         """Body of a component; None for idle components and for planets other than the first of a set."""
         return self._of_part.get(part.number)
 
-    def body_of(self, part: Component) -> Body | None:
+    def body_of(self, part: Component) -> RigidGroup | None:
         """Body of a component, for any planet of a set."""
         return self._of_part.get(part.number) or self._of_other.get(part.number)
 
@@ -138,7 +138,7 @@ def connections(model: Model) -> Iterator[tuple[Component, Component, Component]
             yield part, *both
 
 
-def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
+def find_bodies(model: Model, places: ComponentPositions, notes: Notes) -> RigidGroups:
     """Group components into bodies."""
     union = _joined(model, notes)
     held = held_by_speed(model)
@@ -152,28 +152,28 @@ def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
     names = _names(
         {root: parts for root, parts in groups.items() if root in working - planets}, _carriers(model, union)
     )
-    bodies: list[Body] = []
+    bodies: list[RigidGroup] = []
     for root, parts in groups.items():
         if root in names:
             fixed = _is_fixed(parts, held)
-            bodies.append(Body(names[root], tuple(_axial(parts)), _axis(places, parts, pins), fixed))
+            bodies.append(RigidGroup(names[root], tuple(_axial(parts)), _axis(places, parts, pins), fixed))
             stopped = [str(part) for part in parts if part.number in held]
             if stopped and not _is_fixed(parts, ()):
                 notes.changed.append(f"{', '.join(stopped)}: fixed, since the file defines its speed as 0")
         elif root not in planets and not _is_fixed(parts, held):
             notes.lost.append(f"{', '.join(str(part) for part in parts)}: in no mesh, rotates without load")
     by_root = {union.root(part.number): body for body in bodies for part in body.parts}
-    carried: list[tuple[Body, list[_Planet]]] = []
+    carried: list[tuple[RigidGroup, list[_Planet]]] = []
     for stage, members in sets:
         carrier = _carrier(model, union, by_root, stage, members[0][1])
         carried += [(carrier, orbit) for orbit in _orbits(places, members, carrier.axis)]
-    planet_bodies: list[Body] = []
+    planet_bodies: list[RigidGroup] = []
     for number, (carrier, placed) in enumerate(carried):
         placed = _order_by_mating_planets(model, groups, placed, planet_bodies)
         first, *others = (tuple(_axial(groups[planet.root])) for planet in placed)
         x, y, _ = places.position(placed[0].shaft)
         planet_bodies.append(
-            Body(
+            RigidGroup(
                 name=_lettered("planet", number, len(carried)),
                 parts=first,
                 axis=(x, y),
@@ -183,7 +183,7 @@ def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
                 carrier=carrier.name,
             )
         )
-    return Bodies([*bodies, *planet_bodies])
+    return RigidGroups([*bodies, *planet_bodies])
 
 
 def _joined(model: Model, notes: Notes) -> _Union:
@@ -266,7 +266,7 @@ def _axial(parts: Iterable[Component]) -> list[Component]:
     return [part for part in parts if part.type != "gear_casing"]
 
 
-def _axis(places: Places, parts: Sequence[Component], pins: set[int]) -> tuple[float, float]:
+def _axis(places: ComponentPositions, parts: Sequence[Component], pins: set[int]) -> tuple[float, float]:
     """Axis of a body, mm: that of its gears, else of its shafts and plates, without the pins of planets."""
     rank = {"cylindrical_gear": 0, "ring_gear": 0, "shaft": 1, "side_plate": 2}
     own = sorted((p for p in parts if p.type in rank and p.number not in pins), key=lambda part: rank[part.type])
@@ -281,7 +281,7 @@ def _axis(places: Places, parts: Sequence[Component], pins: set[int]) -> tuple[f
 
 
 def _planet_sets(
-    model: Model, places: Places, union: _Union, groups: Mapping[int, list[Component]]
+    model: Model, places: ComponentPositions, union: _Union, groups: Mapping[int, list[Component]]
 ) -> list[tuple[int, list[tuple[int, Component]]]]:
     """Group the planets into sets of equal ones: number of the stage, and (root, shaft) of each."""
     sets: dict[tuple[object, ...], tuple[int, list[tuple[int, Component]]]] = {}
@@ -312,7 +312,9 @@ class _Planet:
     shaft: Component
 
 
-def _carrier(model: Model, union: _Union, by_root: Mapping[int, Body], stage: int, shaft: Component) -> Body:
+def _carrier(
+    model: Model, union: _Union, by_root: Mapping[int, RigidGroup], stage: int, shaft: Component
+) -> RigidGroup:
     """Carrier of the planets of a stage, of which one has the shaft."""
     held = [
         one.number
@@ -328,7 +330,9 @@ def _carrier(model: Model, union: _Union, by_root: Mapping[int, Body], stage: in
     return carrier
 
 
-def _orbits(places: Places, members: Sequence[tuple[int, Component]], axis: tuple[float, float]) -> list[list[_Planet]]:
+def _orbits(
+    places: ComponentPositions, members: Sequence[tuple[int, Component]], axis: tuple[float, float]
+) -> list[list[_Planet]]:
     """Return sets of planets at equal distance from the carrier axis, ordered by angle; a Ravigneaux set has two."""
     orbits: list[list[_Planet]] = []
     for root, shaft in members:
@@ -347,7 +351,7 @@ def _orbits(places: Places, members: Sequence[tuple[int, Component]], axis: tupl
 
 
 def _order_by_mating_planets(
-    model: Model, groups: Mapping[int, list[Component]], placed: list[_Planet], earlier: Sequence[Body]
+    model: Model, groups: Mapping[int, list[Component]], placed: list[_Planet], earlier: Sequence[RigidGroup]
 ) -> list[_Planet]:
     """Rotate the order of planets so that each has the number of the planet of another set with which it meshes."""
     mates: dict[int, set[int]] = {}

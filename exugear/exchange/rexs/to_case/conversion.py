@@ -22,7 +22,7 @@ from exugear.exchange.rexs.mapping import (
     TYPES_OF_ROLES,
     TYPES_WITHOUT_EFFECT,
 )
-from exugear.exchange.rexs.to_case.bodies import Bodies, Body, find_bodies
+from exugear.exchange.rexs.to_case.bodies import RigidGroup, RigidGroups, find_bodies
 from exugear.exchange.rexs.to_case.gear_blocks import (
     Teeth,
     axes_to_move,
@@ -33,7 +33,7 @@ from exugear.exchange.rexs.to_case.gear_blocks import (
 )
 from exugear.exchange.rexs.to_case.loads import (
     Ends,
-    Loads,
+    ImportedLoads,
     ends_of,
     force_blocks,
     life_blocks,
@@ -43,9 +43,9 @@ from exugear.exchange.rexs.to_case.loads import (
 )
 from exugear.exchange.rexs.to_case.notes import (
     Block,
+    ComponentPositions,
     Entry,
     Notes,
-    Places,
     Rules,
     assumed,
     derived,
@@ -77,7 +77,9 @@ INERTIAS = "geometry"
 """Name of the inertia set."""
 
 
-def sections_of_bodies(model: Model, places: Places, bodies: Bodies, notes: Notes) -> dict[str, Sequence[Cylinder]]:
+def sections_of_bodies(
+    model: Model, places: ComponentPositions, bodies: RigidGroups, notes: Notes
+) -> dict[str, Sequence[Cylinder]]:
     """Shaft sections of each body, in the order of z."""
     found: dict[str, Sequence[Cylinder]] = {}
     for body in bodies.members:
@@ -108,7 +110,7 @@ def levelled_under_seats(
 
 
 def _body_block(
-    model: Model, places: Places, body: Body, teeth: Teeth, sections: Sequence[Cylinder], notes: Notes
+    model: Model, places: ComponentPositions, body: RigidGroup, teeth: Teeth, sections: Sequence[Cylinder], notes: Notes
 ) -> Block:
     """Table of a body with its inertia and shape."""
     block = Block(", ".join(str(part) for part in body.parts))
@@ -170,7 +172,7 @@ def _mass_entries(pieces: Sequence[Cylinder]) -> dict[str, float]:
     return {key: float(f"{value:.6g}") for key, value in values.items()}
 
 
-def _has_shape(model: Model, body: Body, sections: Sequence[Cylinder]) -> bool:
+def _has_shape(model: Model, body: RigidGroup, sections: Sequence[Cylinder]) -> bool:
     """Return whether the sections of a body form one flexible shaft."""
     shafts = [part for part in body.parts_of_type("shaft") if part.given("support_vector")]
     materials = [material_of(model, shaft) for shaft in shafts]
@@ -181,7 +183,7 @@ def _has_shape(model: Model, body: Body, sections: Sequence[Cylinder]) -> bool:
     return plain_shaft and not rigid and len(set(materials)) == 1 and is_continuous(sections)
 
 
-def _shape(model: Model, body: Body, sections: Sequence[Cylinder]) -> Block:
+def _shape(model: Model, body: RigidGroup, sections: Sequence[Cylinder]) -> Block:
     pieces = []
     for one in sections:
         piece = {"length_mm": one.length, "outer_diameter_mm": one.outers[0]}
@@ -215,7 +217,7 @@ def meshes_of_bodies(teeth: Teeth) -> dict[str, int]:
     return counts
 
 
-def gear_places(teeth: Teeth, bodies: Bodies) -> dict[str, float]:
+def gear_places(teeth: Teeth, bodies: RigidGroups) -> dict[str, float]:
     """Axial middle of the first gear of each body, or of the planets of a carrier, mm."""
     found: dict[str, float] = {}
     for number, body in teeth.bodies.items():
@@ -238,8 +240,8 @@ class Found(ReprMixin, line=" in {model!r}: {bodies!r}"):
     """Content of a REXS file found by an import, with the names of the gearbox file."""
 
     model: Model
-    places: Places
-    bodies: Bodies
+    places: ComponentPositions
+    bodies: RigidGroups
     teeth: Teeth
     bearings: Mapping[str, Block]
 
@@ -290,8 +292,8 @@ def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules:
     _refuse_types(model, notes)
     _refuse_misplaced(model, notes)
     notes.errors.tell()
-    places = Places(model)
-    draft = _Draft(model, places, notes)
+    places = ComponentPositions(model)
+    draft = _GearboxDraft(model, places, notes)
     notes.errors.tell()
     static = draft.static.value[draft.ends.input]
     draft.leave_stiff(source, path)
@@ -337,10 +339,10 @@ def _refuse_misplaced(model: Model, notes: Notes) -> None:
                 )
 
 
-class _Draft:
+class _GearboxDraft:
     """All tables of the gearbox file except the load cases."""
 
-    def __init__(self, model: Model, places: Places, notes: Notes) -> None:
+    def __init__(self, model: Model, places: ComponentPositions, notes: Notes) -> None:
         self.model, self.notes = model, notes
         bodies, self.teeth = _placed(model, places, notes)
         bearings = bearing_blocks(model, places, bodies, notes)
@@ -424,7 +426,7 @@ class _Draft:
         return toml_text(_head(self.model, source, self.notes), top, groups)
 
 
-def _placed(model: Model, places: Places, notes: Notes) -> tuple[Bodies, Teeth]:
+def _placed(model: Model, places: ComponentPositions, notes: Notes) -> tuple[RigidGroups, Teeth]:
     """Bodies and gears at positions that agree with the selected centre distances."""
     first = Notes(notes.rules)
     bodies = find_bodies(model, places, first)
@@ -442,7 +444,7 @@ def _named(table: str, blocks: Mapping[str, Block]) -> dict[str, Block]:
     return {f"{table}.{name}": block for name, block in blocks.items()}
 
 
-def _settings(model: Model, places: Places, ends: Ends, static: Entry, gear: str) -> dict[str, Block]:
+def _settings(model: Model, places: ComponentPositions, ends: Ends, static: Entry, gear: str) -> dict[str, Block]:
     blocks = {
         "overall": Block(
             "", {"input": derived(ends.input, ends.reason), "output": Entry(ends.output), "output_gear": Entry(gear)}
@@ -499,7 +501,7 @@ def _note_ignored(model: Model, notes: Notes) -> None:
             notes.ignored.append(f"{kind}: {', '.join(plain(key) for key in sorted(unread))}")
 
 
-def _compare_speeds(gearbox: Gearbox, loads: Sequence[Loads], ends: Ends, notes: Notes) -> None:
+def _compare_speeds(gearbox: Gearbox, loads: Sequence[ImportedLoads], ends: Ends, notes: Notes) -> None:
     """Compare the speeds that the file specifies for several bodies with the kinematic speeds."""
     if gearbox.train.degrees_of_freedom != 1:
         return

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from exugear.exchange.rexs.to_case.bodies import Bodies, Body
+from exugear.exchange.rexs.to_case.bodies import RigidGroup, RigidGroups
 from exugear.exchange.rexs.to_case.meshing import (
     PLACE_TOLERANCE,
     Stage,
@@ -21,7 +21,7 @@ from exugear.exchange.rexs.to_case.meshing import (
     with_possible_cutter,
     with_shifts,
 )
-from exugear.exchange.rexs.to_case.notes import Block, Entry, Notes, Places, assumed, derived, read, tidy
+from exugear.exchange.rexs.to_case.notes import Block, ComponentPositions, Entry, Notes, assumed, derived, read, tidy
 from exugear.exchange.rexs.to_case.shafts import Cylinder, seat_diameter
 from exugear.exchange.rexs.to_case.toothing import Toothing, is_rigid, material_of, material_table, toothing_of
 from exugear.exchange.rexs.tree import Component, Model, RexsError
@@ -46,12 +46,12 @@ class Teeth:
     names: Mapping[int, str]
     stages: Mapping[str, Stage]
     """Stages by the name of their pair."""
-    bodies: Mapping[int, Body]
+    bodies: Mapping[int, RigidGroup]
     z: Mapping[int, float]
     """Axial position of the middle of each gear, mm."""
 
 
-def teeth_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> Teeth:
+def teeth_of(model: Model, places: ComponentPositions, bodies: RigidGroups, notes: Notes) -> Teeth:
     """Collect gears and stages.
 
     Raises
@@ -101,7 +101,7 @@ def teeth_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> Teet
     )
 
 
-def first_of_planets(model: Model, places: Places, bodies: Bodies) -> dict[int, int]:
+def first_of_planets(model: Model, places: ComponentPositions, bodies: RigidGroups) -> dict[int, int]:
     """Map the gear of each planet to the equal gear of the first planet, by their numbers."""
 
     def ordered(parts: Iterable[Component]) -> list[int]:
@@ -124,7 +124,7 @@ def _stage(model: Model, roles: Mapping[str, int]) -> tuple[Component, list[Comp
     return model.components[roles["stage"]], [model.components[roles[role]] for role in ("gear_1", "gear_2")]
 
 
-def _check_direction(places: Places, stage: Component, gears: Sequence[Component], notes: Notes) -> None:
+def _check_direction(places: ComponentPositions, stage: Component, gears: Sequence[Component], notes: Notes) -> None:
     """Compare the direction of the line of centres with the positions."""
     one, other = (places.position(gear) for gear in gears)
     stated = stage.quantity("rotating_angle_around_neg_u_axis")
@@ -137,7 +137,10 @@ def _check_direction(places: Places, stage: Component, gears: Sequence[Component
 
 
 def _ordered(
-    places: Places, met: Iterable[tuple[Component, list[Component]]], gears: Mapping[int, Toothing], notes: Notes
+    places: ComponentPositions,
+    met: Iterable[tuple[Component, list[Component]]],
+    gears: Mapping[int, Toothing],
+    notes: Notes,
 ) -> list[Stage]:
     stages = []
     for part, (one, other) in met:
@@ -157,7 +160,7 @@ def _ordered(
     return stages
 
 
-def _common_face(places: Places, stage: Component, pinion: Toothing, gear: Toothing) -> Entry | None:
+def _common_face(places: ComponentPositions, stage: Component, pinion: Toothing, gear: Toothing) -> Entry | None:
     """Return the common face width of the gears, if it is less than the narrower face width."""
     least = min(pinion.face_width.value, gear.face_width.value)
     low = -math.inf
@@ -188,7 +191,7 @@ def _check_equal_planets(model: Model, first: Mapping[int, int], gears: Mapping[
 
 
 def axes_to_move(
-    teeth: Teeth, bodies: Bodies, places: Places
+    teeth: Teeth, bodies: RigidGroups, places: ComponentPositions
 ) -> list[tuple[tuple[Component, ...], tuple[float, float]]]:
     """Parts and the displacements (mm) that produce the selected centre distances; empty if all positions agree.
 
@@ -229,7 +232,7 @@ def axes_to_move(
     return [move for body in bodies.members for move in _moves(places, bodies, body, axes)]
 
 
-def _coaxial(bodies: Bodies, body: Body) -> list[str]:
+def _coaxial(bodies: RigidGroups, body: RigidGroup) -> list[str]:
     """Names of the coaxial bodies; a planet forms its own group."""
     if body.carrier:
         return [body.name]
@@ -241,7 +244,7 @@ def _coaxial(bodies: Bodies, body: Body) -> list[str]:
 
 
 def _moves(
-    places: Places, bodies: Bodies, body: Body, axes: Mapping[str, tuple[float, float]]
+    places: ComponentPositions, bodies: RigidGroups, body: RigidGroup, axes: Mapping[str, tuple[float, float]]
 ) -> Iterator[tuple[tuple[Component, ...], tuple[float, float]]]:
     """Yield the displacements of the parts of a body; each planet of a set moves along its own radius."""
     new = axes[body.name]
@@ -258,7 +261,9 @@ def _moves(
         yield parts, (target[0] - x, target[1] - y)
 
 
-def _gear_names(gears: Mapping[int, Toothing], stages: Sequence[Stage], owners: Mapping[int, Body]) -> dict[int, str]:
+def _gear_names(
+    gears: Mapping[int, Toothing], stages: Sequence[Stage], owners: Mapping[int, RigidGroup]
+) -> dict[int, str]:
     """Role of each gear; several gears of one role are numbered in the order of the stages."""
     central = {
         number
@@ -282,7 +287,7 @@ def _gear_names(gears: Mapping[int, Toothing], stages: Sequence[Stage], owners: 
     }
 
 
-def _pair_names(gears: Mapping[int, Toothing], stages: Sequence[Stage], owners: Mapping[int, Body]) -> list[str]:
+def _pair_names(gears: Mapping[int, Toothing], stages: Sequence[Stage], owners: Mapping[int, RigidGroup]) -> list[str]:
     names: list[str] = []
     for number, stage in enumerate(stages, 1):
         planet = next((owners[one].name for one in stage.both if owners[one].carrier), "")

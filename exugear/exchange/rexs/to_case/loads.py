@@ -9,10 +9,20 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from exugear.exchange.rexs.mapping import READ
-from exugear.exchange.rexs.to_case.bodies import Bodies, Body
-from exugear.exchange.rexs.to_case.notes import Block, Entry, Notes, Places, assumed, derived, entries_of, read, tidy
+from exugear.exchange.rexs.to_case.bodies import RigidGroup, RigidGroups
+from exugear.exchange.rexs.to_case.notes import (
+    Block,
+    ComponentPositions,
+    Entry,
+    Notes,
+    assumed,
+    derived,
+    entries_of,
+    read,
+    tidy,
+)
 from exugear.exchange.rexs.to_case.toothing import material_of
-from exugear.exchange.rexs.tree import Component, LoadCase, Model, RexsError
+from exugear.exchange.rexs.tree import Component, Model, RexsError, RexsLoadCase
 from exugear.gearbox.units import RPM
 
 FORCES = ("force_u_direction", "force_v_direction", "force_w_direction")
@@ -53,7 +63,7 @@ LEAST_SHARE = 0.1
 
 
 @dataclass(frozen=True)
-class PointForce:
+class ImportedForce:
     """Force (N) and moment (N m) on a body at an axial position, in the axes of the gearbox file."""
 
     part: Component
@@ -67,7 +77,7 @@ class PointForce:
 
 
 @dataclass(frozen=True)
-class Loads:
+class ImportedLoads:
     """Torques (N m) and speeds (rpm) on bodies, positive about +z."""
 
     name: str
@@ -76,7 +86,7 @@ class Loads:
     torques: Mapping[str, float]
     speeds: Mapping[str, float]
     """Speeds by body name."""
-    forces: Mapping[int, PointForce] = field(default_factory=dict)
+    forces: Mapping[int, ImportedForce] = field(default_factory=dict)
     """Forces by the number of the component."""
     share: float | None = None
     """Fraction of the operating time, %; None if the file has no value."""
@@ -91,12 +101,14 @@ class Ends:
     reason: str
 
 
-def loads_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> list[Loads]:
+def loads_of(model: Model, places: ComponentPositions, bodies: RigidGroups, notes: Notes) -> list[ImportedLoads]:
     """Collect the loads of each load case, or of the file itself if it has none."""
     return [_loads(model, places, bodies, case, notes) for case in model.load_cases or (None,)]
 
 
-def _loads(model: Model, places: Places, bodies: Bodies, case: LoadCase | None, notes: Notes) -> Loads:
+def _loads(
+    model: Model, places: ComponentPositions, bodies: RigidGroups, case: RexsLoadCase | None, notes: Notes
+) -> ImportedLoads:
     speeds: dict[str, float] = {}
     for shaft in model.components_in(case, "shaft"):
         body = bodies.body_of(shaft)
@@ -104,7 +116,7 @@ def _loads(model: Model, places: Places, bodies: Bodies, case: LoadCase | None, 
         if body is not None and speed is not None and not body.fixed:
             speeds.setdefault(body.name, tidy(places.sense(shaft) * speed))
     torques: dict[str, float] = {}
-    forces: dict[int, PointForce] = {}
+    forces: dict[int, ImportedForce] = {}
     for load in model.components_in(case, "external_load"):
         owner = _shaft(model, load)
         body = _free_body(bodies, owner)
@@ -124,12 +136,14 @@ def _loads(model: Model, places: Places, bodies: Bodies, case: LoadCase | None, 
     for unit in model.components_in(case, "gear_unit"):
         share = unit.quantity("operating_time_fraction")
     name = f"load_case_{case.number}" if case else "nominal"
-    return Loads(name, "" if share is None else f"{share:g} % of the operating time", torques, speeds, forces, share)
+    return ImportedLoads(
+        name, "" if share is None else f"{share:g} % of the operating time", torques, speeds, forces, share
+    )
 
 
 def _point_force(
-    places: Places, load: Component, shaft: Component | None, body: Body | None, notes: Notes
-) -> PointForce | None:
+    places: ComponentPositions, load: Component, shaft: Component | None, body: RigidGroup | None, notes: Notes
+) -> ImportedForce | None:
     """Radial and axial force and moment of a load, in the axes of the gearbox file; None if there is none.
 
     A load on a planet rotates with its carrier and is omitted; the casing can carry any load.
@@ -144,7 +158,7 @@ def _point_force(
         return None
     axes = places.axes(shaft)
     z = places.position(shaft)[2] + places.sense(shaft) * (load.quantity("u_coordinate_on_shaft") or 0.0)
-    return PointForce(
+    return ImportedForce(
         load,
         body.name,
         tidy(round(z, 9)),
@@ -158,7 +172,7 @@ def _shaft(model: Model, load: Component) -> Component | None:
     return next((owner for owner in owners if owner.type in ("shaft", "side_plate", "planet_carrier")), None)
 
 
-def _free_body(bodies: Bodies, shaft: Component | None) -> Body | None:
+def _free_body(bodies: RigidGroups, shaft: Component | None) -> RigidGroup | None:
     """Body of a shaft unless it is fixed or a planet."""
     body = bodies.body_of(shaft) if shaft else None
     if body is None or body.fixed or body.carrier:
@@ -166,7 +180,7 @@ def _free_body(bodies: Bodies, shaft: Component | None) -> Body | None:
     return body
 
 
-def ends_of(model: Model, bodies: Bodies, loads: Sequence[Loads], links: Mapping[str, int]) -> Ends:
+def ends_of(model: Model, bodies: RigidGroups, loads: Sequence[ImportedLoads], links: Mapping[str, int]) -> Ends:
     """Determine input and output of the gearbox.
 
     Parameters
@@ -205,7 +219,7 @@ def ends_of(model: Model, bodies: Bodies, loads: Sequence[Loads], links: Mapping
     return Ends(first, others[-1], why)
 
 
-def static_load(loads: Sequence[Loads], ends: Ends) -> Entry:
+def static_load(loads: Sequence[ImportedLoads], ends: Ends) -> Entry:
     """Torque of the static state: the largest input torque of all load cases."""
     torques = [load.torques[ends.input] for load in loads if load.torques.get(ends.input)]
     if not torques:
@@ -214,7 +228,7 @@ def static_load(loads: Sequence[Loads], ends: Ends) -> Entry:
     return read({ends.input: max(torques, key=abs)}, source)
 
 
-def force_blocks(loads: Sequence[Loads], ends: Ends, notes: Notes) -> dict[str, Block]:
+def force_blocks(loads: Sequence[ImportedLoads], ends: Ends, notes: Notes) -> dict[str, Block]:
     """Tables of the constant forces of the load case with the static load, which act in all load cases.
 
     If forces differ between load cases, this is reported.
@@ -240,7 +254,7 @@ def force_blocks(loads: Sequence[Loads], ends: Ends, notes: Notes) -> dict[str, 
     return blocks
 
 
-def load_case_blocks(loads: Sequence[Loads], ends: Ends, static: float, ratio: float) -> dict[str, Block]:
+def load_case_blocks(loads: Sequence[ImportedLoads], ends: Ends, static: float, ratio: float) -> dict[str, Block]:
     """Tables of the load cases, each at its speed with balanced torques, and of a run-up to the highest speed.
 
     Parameters
@@ -283,7 +297,7 @@ def _run_up(ends: Ends, torque: float, ratio: float, speed: float) -> Block:
     )
 
 
-def _input_speed(loads: Loads, ends: Ends, ratio: float) -> float:
+def _input_speed(loads: ImportedLoads, ends: Ends, ratio: float) -> float:
     if ends.input in loads.speeds:
         return loads.speeds[ends.input]
     return loads.speeds.get(ends.output, 0.0) / ratio
@@ -307,7 +321,7 @@ class LifeLoads:
 
 
 def life_blocks(
-    model: Model, loads: Sequence[Loads], ends: Ends, ratio: float, gears: Mapping[str, tuple[Component, bool]]
+    model: Model, loads: Sequence[ImportedLoads], ends: Ends, ratio: float, gears: Mapping[str, tuple[Component, bool]]
 ) -> LifeLoads:
     """Sections on operation, loads and rating, as far as the file has the data that `life` requires.
 
@@ -339,7 +353,9 @@ def life_blocks(
     return LifeLoads("torque_N_m,speed_rpm,hours\n" + "".join(lines), blocks)
 
 
-def _spectrum(model: Model, loads: Sequence[Loads], ends: Ends, ratio: float) -> tuple[str, Entry, list[str]] | None:
+def _spectrum(
+    model: Model, loads: Sequence[ImportedLoads], ends: Ends, ratio: float
+) -> tuple[str, Entry, list[str]] | None:
     """Return the loaded body, years, and rows of torque, speed and hours; None if the file has insufficient data."""
     body = next((end for end in (ends.input, ends.output) if all(load.torques.get(end) for load in loads)), None)
     shares = [100.0] if len(loads) == 1 else [load.share or 0.0 for load in loads]

@@ -195,7 +195,7 @@ TURNING = ("shaft", "cylindrical_gear", "ring_gear", "side_plate")
 """Types of components whose u axis is an axis of rotation."""
 
 
-class Places(ReprMixin):
+class ComponentPositions(ReprMixin):
     """Positions (mm) and directions of components.
 
     REXS positions a component in the frame (u, v, w) of another, mostly of the gear unit. The axes x, y, z are the gear

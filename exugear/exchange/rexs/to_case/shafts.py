@@ -8,8 +8,8 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from exugear.exchange.rexs.to_case.bodies import Body
-from exugear.exchange.rexs.to_case.notes import Notes, Places, tidy
+from exugear.exchange.rexs.to_case.bodies import RigidGroup
+from exugear.exchange.rexs.to_case.notes import ComponentPositions, Notes, tidy
 from exugear.exchange.rexs.to_case.toothing import Toothing, is_rigid, material_of
 from exugear.exchange.rexs.tree import Component, Model, RexsError
 from exugear.gearbox.units import MM
@@ -81,7 +81,9 @@ def inertia_of(cylinders: Iterable[Cylinder]) -> MassProperties:
     )
 
 
-def sections_of(model: Model, places: Places, shaft: Component, body: Body, notes: Notes) -> list[Cylinder]:
+def sections_of(
+    model: Model, places: ComponentPositions, shaft: Component, body: RigidGroup, notes: Notes
+) -> list[Cylinder]:
     """Sections of a shaft in the order of z.
 
     Raises
@@ -157,7 +159,7 @@ def gear_tube(model: Model, gear: Toothing, z: float, seat: float | None, notes:
     return Cylinder(z - 0.5 * width, width, (outer, outer), (inner, inner), _density(model, gear.part, notes))
 
 
-def plate(model: Model, places: Places, part: Component, notes: Notes) -> Cylinder | None:
+def plate(model: Model, places: ComponentPositions, part: Component, notes: Notes) -> Cylinder | None:
     """Side plate of a carrier."""
     length = part.quantity("length")
     outer = part.quantity("outer_diameter")

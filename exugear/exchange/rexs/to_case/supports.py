@@ -8,15 +8,25 @@ from collections.abc import Iterator, Mapping
 from exugear.exchange.rexs.mapping import BEARINGS, JOINING, PLAIN_BEARINGS, READ, ROLLING_TYPES
 from exugear.exchange.rexs.to_case.bodies import (
     RIGID_ABOVE,
-    Bodies,
-    Body,
+    RigidGroup,
+    RigidGroups,
     connections,
     ends,
     is_one_piece,
     is_rigid_in_torsion,
     torsional_stiffness,
 )
-from exugear.exchange.rexs.to_case.notes import Block, Entry, Notes, Places, assumed, derived, entries_of, read, tidy
+from exugear.exchange.rexs.to_case.notes import (
+    Block,
+    ComponentPositions,
+    Entry,
+    Notes,
+    assumed,
+    derived,
+    entries_of,
+    read,
+    tidy,
+)
 from exugear.exchange.rexs.tree import Component, Model, RexsError, plain
 from exugear.gearbox.sections.connections import CONTACT_ANGLES_DEG, TYPES_OF_KEYS
 from exugear.gearbox.sections.designations import boundary_of
@@ -40,7 +50,7 @@ RIGID = {"radial_stiffness": 1e10, "axial_stiffness": 1e10, "bending_stiffness":
 """Stiffness used for rigid: above that of teeth and bearings, but not higher, because of the time step."""
 
 
-def bearing_blocks(model: Model, places: Places, bodies: Bodies, notes: Notes) -> dict[str, Block]:
+def bearing_blocks(model: Model, places: ComponentPositions, bodies: RigidGroups, notes: Notes) -> dict[str, Block]:
     """Tables of all bearings by name, and of connections that support a body without joining it rigidly."""
     blocks: dict[str, Block] = {}
     for part in model.components_of_type(*BEARINGS, *PLAIN_BEARINGS):
@@ -57,7 +67,7 @@ def bearing_blocks(model: Model, places: Places, bodies: Bodies, notes: Notes) -
     return blocks
 
 
-def coupling_blocks(model: Model, bodies: Bodies, bearings: Mapping[str, Block]) -> dict[str, Block]:
+def coupling_blocks(model: Model, bodies: RigidGroups, bearings: Mapping[str, Block]) -> dict[str, Block]:
     """Tables of the connections that couple the rotation of two bodies, by name; `bearings` act in other directions."""
     blocks: dict[str, Block] = {}
     seats = {block.number: name for name, block in bearings.items()}
@@ -78,7 +88,7 @@ def coupling_blocks(model: Model, bodies: Bodies, bearings: Mapping[str, Block])
     return blocks
 
 
-def _stiff_torsion(*bodies: Body) -> float:
+def _stiff_torsion(*bodies: RigidGroup) -> float:
     """Torsional stiffness used for rigid, N m/rad: the rigid radial stiffness at the largest reference circle."""
     diameters = [
         (gear.whole("number_of_teeth") or 0) * (gear.quantity("normal_module") or 0.0)
@@ -89,7 +99,7 @@ def _stiff_torsion(*bodies: Body) -> float:
     return float(f"{RIGID['radial_stiffness'] * radius**2:.2g}")
 
 
-def joint_blocks(bodies: Bodies, bearings: dict[str, Block], gear_places: dict[str, float]) -> dict[str, Block]:
+def joint_blocks(bodies: RigidGroups, bearings: dict[str, Block], gear_places: dict[str, float]) -> dict[str, Block]:
     """Joints of the variant `rigid`: one for each body, in the middle of its bearings, or at its gear."""
     blocks = {}
     for body in bodies.members:
@@ -107,7 +117,7 @@ def joint_blocks(bodies: Bodies, bearings: dict[str, Block], gear_places: dict[s
     return blocks
 
 
-def _flexible_connections(model: Model, bodies: Bodies) -> Iterator[tuple[Component, Body, Body]]:
+def _flexible_connections(model: Model, bodies: RigidGroups) -> Iterator[tuple[Component, RigidGroup, RigidGroup]]:
     """Yield couplings and fits between two separate bodies, once for equal planets."""
     for part, *both in connections(model):
         inner, outer = (bodies.of(end) for end in both)
@@ -115,7 +125,9 @@ def _flexible_connections(model: Model, bodies: Bodies) -> Iterator[tuple[Compon
             yield part, inner, outer
 
 
-def _bearing(model: Model, places: Places, bodies: Bodies, part: Component, notes: Notes) -> Block | None:
+def _bearing(
+    model: Model, places: ComponentPositions, bodies: RigidGroups, part: Component, notes: Notes
+) -> Block | None:
     both = ends(model, part)
     if both is None:
         raise RexsError(f"{part}: no relation 'side' defines the supported and the supporting body")
@@ -141,7 +153,7 @@ def _bearing(model: Model, places: Places, bodies: Bodies, part: Component, note
     return block
 
 
-def _check_place(places: Places, part: Component, both: tuple[Component, Component], notes: Notes) -> None:
+def _check_place(places: ComponentPositions, part: Component, both: tuple[Component, Component], notes: Notes) -> None:
     """Compare the position of a bearing with its coordinate on the connected shafts."""
     for side, shaft in zip(("inner", "outer"), both, strict=True):
         along = part.quantity(f"u_coordinate_on_shaft_{side}_side")
@@ -155,7 +167,9 @@ def _check_place(places: Places, part: Component, both: tuple[Component, Compone
             )
 
 
-def _placed(places: Places, part: Component, body: Body, on: Body | None, inside: dict[str, Block]) -> Block:
+def _placed(
+    places: ComponentPositions, part: Component, body: RigidGroup, on: RigidGroup | None, inside: dict[str, Block]
+) -> Block:
     entries = {"body": Entry(body.name)}
     if on is not None and not on.fixed:
         entries["on"] = Entry(on.name)

@@ -104,7 +104,7 @@ from fe_ste.transmission_error.table import TableError
 TABLE_FORM = 1
 
 
-class Table(Law):
+class TableLaw(Law):
     """The whole table of a pair, both flanks."""
 
     form = TABLE_FORM
@@ -476,4 +476,4 @@ def _fill_table(arrays: TableArrays, m: int, flanks: TableFlanks, surface: SteSu
         arrays.has_guesses[m], arrays.acting_guesses[m, : acting.size] = 1, acting
 
 
-LAW = Table()
+LAW = TableLaw()

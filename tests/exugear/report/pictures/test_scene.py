@@ -12,7 +12,7 @@ from exugear.report.pictures.scene import (
     draw_gearbox,
     draw_mode,
 )
-from exugear.report.pictures.shapes import BodyShape, Surface, gear_surface, mode_scene, tube_surface
+from exugear.report.pictures.shapes import BodyShape, TriangleSurface, gear_surface, mode_scene, tube_surface
 from fe_ste.geometry.gears import Gear
 
 from ....optional_libraries import needs_rendering
@@ -20,7 +20,7 @@ from ....optional_libraries import needs_rendering
 
 def bodies():
     gear = Gear(name="gear", teeth=30, normal_module=3e-3, helix_angle=0.2, face_width=20e-3, held_diameter=50e-3)
-    wheel = Surface.joined([gear_surface(gear), tube_surface(50e-3, -40e-3, 40e-3)])
+    wheel = TriangleSurface.joined([gear_surface(gear), tube_surface(50e-3, -40e-3, 40e-3)])
     ring = tube_surface(150e-3, -10e-3, 10e-3, bore=120e-3)
     return (
         BodyShape("housing", "housing", ring, np.zeros(3), fixed=True),

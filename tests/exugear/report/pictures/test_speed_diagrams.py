@@ -11,7 +11,7 @@ import pytest
 
 from exugear.gearbox.units import RPM
 from exugear.report.findings.ranking import Envelope, Limit, PeakAmplitude, Ranking, Resonance
-from exugear.report.pictures.shapes import BodyShape, Surface
+from exugear.report.pictures.shapes import BodyShape, TriangleSurface
 from exugear.report.pictures.speed_diagrams import TOP, campbell_of, strips_of
 from exugear.report.pictures.still import SIZE, mode_picture
 from exugear.results.spectra.waterfall import OrderLine
@@ -75,7 +75,7 @@ def test_a_still_picture_is_transparent_around_bodies_and_red_where_they_move():
     triangles = np.array([[0, 1, 2], [0, 2, 3]])
 
     def plate(name, x):
-        return BodyShape(name, name, Surface(square + [x, 0.0, 0.0], triangles), np.array([x, 0.0, 0.0]))
+        return BodyShape(name, name, TriangleSurface(square + [x, 0.0, 0.0], triangles), np.array([x, 0.0, 0.0]))
 
     bodies = [
         (plate("resting", -1.5), np.zeros(6), None),

@@ -6,7 +6,7 @@ from pathlib import Path as FilePath
 import numpy as np
 import pytest
 
-from exugear.report.pictures.shapes import Surface, gear_surface, tube_surface
+from exugear.report.pictures.shapes import TriangleSurface, gear_surface, tube_surface
 from fe_ste.geometry.gears import Gear
 from fe_ste.geometry.profile import tooth_profile
 
@@ -101,5 +101,5 @@ def test_tube_has_its_volume():
 
 def test_surfaces_join_without_mixing():
     first, second = tube_surface(0.1, 0.0, 0.1), tube_surface(0.2, 0.0, 0.1)
-    joined = Surface.joined([first, second])
+    joined = TriangleSurface.joined([first, second])
     assert abs(volume(joined)) == pytest.approx(abs(volume(first)) + abs(volume(second)))

@@ -21,7 +21,7 @@ def spectra(runs):
     return {
         "<Waterfall: 995 spectra of 820 lines, ": run,
         "<OrderCut: order 60 (<b>long long": cut,
-        "<Resonance 60": group_by_frequency(pick_resonances(run, [MESH]))[0],
+        "<WaterfallResonance 60": group_by_frequency(pick_resonances(run, [MESH]))[0],
         f"<VariantRun bushing, {conditions}, 3 peaks>": runs[0],
         f"<Comparison bushing with rigid, {conditions}: only first 2, only second 0>": compare(*runs),
     }

@@ -10,7 +10,7 @@ import pytest
 import scipy.integrate
 
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError, solve_lines
-from exugear.steady.harmonics.lines import Coupling, Group, Modulator, beside, joined, line_set, rank1_lattice
+from exugear.steady.harmonics.lines import Group, HarmonicCoupling, Modulator, beside, joined, line_set, rank1_lattice
 
 BASES = (1.0, 0.5 * (1.0 + 5.0**0.5))
 
@@ -20,7 +20,7 @@ def product_of(lines, base, coefficients, signal):
     both = np.concatenate([np.conj(coefficients[:0:-1]), coefficients])
     harmonics = np.zeros((len(both), lines.index.shape[1]), dtype=np.int64)
     harmonics[:, base] = np.arange(len(both)) - len(coefficients) + 1
-    coupling = Coupling(lines, (Group(0, 1, harmonics),))
+    coupling = HarmonicCoupling(lines, (Group(0, 1, harmonics),))
     return coupling.of([both[:, None, None]], signal[:, None])[:, 0]
 
 
@@ -69,7 +69,7 @@ def test_signals_of_a_group_are_mixed_as_their_functions_say_at_every_angle():
     angles = rng.uniform(0.0, 2.0 * np.pi, (20, 2))
     whole = mixing[0].real + 2.0 * np.real(mixing[1] * np.exp(1j * (angles[:, 0] - angles[:, 1]))[:, None, None])
     values = lines.values(signals, angles)
-    found = lines.values(Coupling(lines, groups).of(functions, signals), angles)
+    found = lines.values(HarmonicCoupling(lines, groups).of(functions, signals), angles)
     np.testing.assert_allclose(found[:, :9], (whole @ values[:, :9, None])[..., 0], rtol=0.0, atol=1e-10)
     np.testing.assert_allclose(found[:, 9], 2.0 * values[:, 9], rtol=0.0, atol=1e-12)
 

@@ -33,7 +33,7 @@ from exugear.system.kernels.table_law import (
     surface_law,
 )
 from exugear.system.system import Assembly
-from exugear.system.tooth_mesh.contact_state import ContactState
+from exugear.system.tooth_mesh.contact_state import MeshContactState
 from exugear.system.tooth_mesh.element import MeshCurve
 from exugear.system.tooth_mesh.laws.registry import LAWS, law_of
 from exugear.system.tooth_mesh.laws.stiffness import pack
@@ -211,7 +211,7 @@ def test_contact_of_a_table_is_its_law_near_the_state_on_either_flank(grc: Gearb
         assert np.abs(both + np.eye(2)).max() < 1e-3
 
 
-def contact_of(tables: TableArrays, force: float, misalignment: float) -> ContactState:
+def contact_of(tables: TableArrays, force: float, misalignment: float) -> MeshContactState:
     """State of contact by differences of the law of the first table, whose deflection at a load is looked for."""
     memory, centre = scratch_memory(), float(tables.nominal[0, NOMINAL_DISTANCE])
 
@@ -230,4 +230,4 @@ def contact_of(tables: TableArrays, force: float, misalignment: float) -> Contac
     tangent = float(at(s, misalignment)[LAW_STIFFNESS])
     lever = (deflection(force, misalignment + h) - deflection(force, misalignment - h)) / (2.0 * h)
     falling = (moment(force, misalignment - h) - moment(force, misalignment + h)) / (2.0 * h)
-    return ContactState(force, s, tangent, misalignment, moment(force, misalignment) / force, lever, falling)
+    return MeshContactState(force, s, tangent, misalignment, moment(force, misalignment) / force, lever, falling)
