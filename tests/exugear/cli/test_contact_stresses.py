@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from exugear.gearbox.templates.kinds import template
 from fe_ste.transmission_error.cycle import harmonics_of
 from fe_ste.transmission_error.table import MeshTable
 
+from ..cases.case_mutations import toml_text
 from ..cases.command import exugear
 from ..cases.spur import COARSE_INPUT
 
@@ -47,8 +49,9 @@ def printed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """Summaries of the commands on one gearbox, and the row of its pair in the report."""
     folder = tmp_path_factory.mktemp("stresses")
     case = folder / "gearbox.toml"
-    text = template("pair") + RATED + "".join(STRENGTH.format(gear=gear) for gear in ("pinion", "wheel"))
-    case.write_text(text, encoding="utf-8")
+    content = tomllib.loads(template("pair"))
+    content |= tomllib.loads(RATED + "".join(STRENGTH.format(gear=gear) for gear in ("pinion", "wheel")))
+    case.write_text(toml_text(content), encoding="utf-8")
     (folder / "loads.csv").write_text(f"torque_N_m,speed_rpm,hours\n{TORQUE},1500,300\n", encoding="utf-8")
     found: dict[str, Any] = {"folder": folder}
     with pytest.MonkeyPatch.context() as patch:
