@@ -1,4 +1,4 @@
-"""Options of design changes and of the ranking: bad ones are refused before anything is computed or written."""
+"""The command `report`: bad options are refused before anything is computed; a gearbox file names its results."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.results.folder import keep_case
 
 from ..cases.command import exugear
+from .test_two_designs import case_in
 
 
 @pytest.fixture
@@ -43,3 +44,14 @@ def test_an_unknown_quantity_in_a_file_is_one_message(grc: Gearbox) -> None:
     with pytest.raises(Exception, match=r"report\.quantity") as caught:
         grc.varied({"report.quantity": "noise"})
     assert "transmission_error" in str(caught.value) and len(str(caught.value)) < 500
+
+
+@pytest.mark.validation
+def test_a_gearbox_file_stands_for_its_results_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    case = case_in(tmp_path)
+    modes = exugear("modes", case, "--variant", "rigid", "--mesh-model", "iso6336")
+    assert modes.exit_code == 0, modes.stderr
+    report = exugear("report", case)
+    assert report.exit_code == 0, report.stderr
+    assert (tmp_path / "results" / "my" / "report.html").is_file()

@@ -134,14 +134,3 @@ def test_a_gearbox_file_without_results_names_their_folder(tmp_path, monkeypatch
     missing = exugear("report", case_in(tmp_path))
     assert missing.exit_code == 2
     assert "results/my: no such folder; specify the results folder of `exugear run`" in missing.stderr
-
-
-@pytest.mark.validation
-def test_a_gearbox_file_stands_for_its_results_folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    case = case_in(tmp_path)
-    modes = exugear("modes", case, "--variant", "rigid", "--mesh-model", "iso6336")
-    assert modes.exit_code == 0, modes.stderr
-    report = exugear("report", case)
-    assert report.exit_code == 0, report.stderr
-    assert (tmp_path / "results" / "my" / "report.html").is_file()
