@@ -297,6 +297,8 @@ def _cause_box(material: ReportData, top: Resonance, known: Contributions | None
 def _remedy_box(material: ReportData, headline: Headline) -> Box:
     """Show the best computed changes, or the command that computes them: estimates are no advice."""
     study = study_of(material.design_study, headline)
+    if study is None and material.design_study is not None:
+        return Box("The computed design changes are for another resonance, quantity or model.", link=CHANGES_NAME)
     if study is None:
         command = shlex.join(["exugear", "report", str(material.context.folder), "--levers"])
         if headline.response is None:

@@ -288,10 +288,10 @@ def test_a_run_that_was_stopped_is_gone_on_with(tmp_path, monkeypatch):
     def stop_once():
         asked.append(1)
         if len(asked) == 3:
-            raise executors.StoppedError
+            raise executors.WorkerStoppedError
 
     monkeypatch.setattr("exugear.studies.point_results.stop_if_asked", stop_once)
-    with pytest.raises(executors.StoppedError):
+    with pytest.raises(executors.WorkerStoppedError):
         compute_batch(task, [PointInput(name, point.changes)])
     again = run_study(study, tmp_path / "again", HERE)
     xr.testing.assert_identical(figures_of(again.dataset), figures_of(whole.dataset))
