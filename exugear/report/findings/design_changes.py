@@ -108,7 +108,7 @@ class DesignStudy:
         return next(name for name, own in DECIDING.items() if self.quantity in own)
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw what each change does to the three quantities, in dB, as `exugear report --levers` lists it.
+        """Draw what each change does to each quantity, in dB, as `exugear report --levers` lists it.
 
         Narrow dark bars: this peak; wide pale bars: highest amplitude of any order in the operating range. Changes that
         cannot be made are left out.

@@ -260,7 +260,7 @@ def _group(
     responses: Mapping[str, xr.Dataset],
     loud: xr.Dataset | None,
 ) -> RunGroup:
-    """Return a group of run-ups, or of steady-state responses; `loud` is the response to rank by three quantities."""
+    """Return a group of run-ups, or of steady-state responses; `loud` is the response to rank."""
     ranked = {name: _ranked(runs, name, windows, constant.get(name), responses.get(name)) for name in runs}
     reference = runs.get(REFERENCE_VARIANT)
     others = {variant: run for variant, run in runs.items() if run is not reference}

@@ -38,7 +38,7 @@ _NAME = re.compile(r"\w+(?:-\w+)*")
 
 @dataclass(frozen=True)
 class QuantityLabel:
-    """Names of one of the three quantities."""
+    """Names of one of the quantities."""
 
     title: str
     column: str

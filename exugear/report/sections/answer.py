@@ -138,7 +138,7 @@ def _scope(material: ReportData, headline: Headline) -> str:
 
 
 def amplitude_text(name: str, amplitude: float) -> str:
-    """Return an amplitude of one of the three quantities (SI units) as text."""
+    """Return an amplitude of one of the quantities (SI units) as text."""
     label = QUANTITIES[name]
     return f"{label.column} ±{rounded_text(label.factor * amplitude)} {label.unit}"
 
@@ -388,6 +388,8 @@ def _rated_lines(headline: Headline, curves: Mapping[str, Envelope], rated: floa
         leader = headline.ranking.leader(name)
         if leader is not None and value > leader.amplitudes[name].amplitude:
             lines.append(f"The {QUANTITIES[name].column} there is higher than at any resonance in the range.")
+    if headline.response is not None:  # the curves over speed omit them
+        lines.append("Quasi-static orders are included.")
     return lines
 
 
@@ -426,7 +428,7 @@ def _doubts(material: ReportData, headline: Headline, top: Resonance) -> Iterato
 
 
 def ranking_section(material: ReportData) -> Part:
-    """Tabulate the ranking by three quantities, with the mode of each resonance, and draw the Campbell diagram."""
+    """Tabulate the ranking with all quantities, with the mode of each resonance, and draw the Campbell diagram."""
     headline = material.headline
     if headline is None:
         return Part()
