@@ -185,7 +185,7 @@ def study_design_changes(
         ranking.quantity,
         resonance,
         list(points),
-        [] if rated is None else rated[1],
+        _requirements(project.gearbox, rated),
     )
     write_design_study(project.folder / DESIGN_CHANGES_FILE, study)
     return study
@@ -267,6 +267,15 @@ def _project_with(project: ComputedProject, gearbox: Gearbox, name: str) -> Comp
             # A copy that was cut off would count as there.
             write_file(copy, path.read_bytes())
     return changed
+
+
+def _requirements(gearbox: Gearbox, rated: Rated | None) -> list[str]:
+    """Return what the unchanged gearbox falls short of, or that this is not known although the file has a rating."""
+    if rated is not None:
+        return rated[1]
+    if gearbox.case.loads is None or gearbox.case.rating is None:
+        return []
+    return [f"no requirement is checked: {NOT_RATED}"]
 
 
 def _failures(before: Rated, after: Rated) -> list[str]:

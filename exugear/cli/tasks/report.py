@@ -238,7 +238,7 @@ def _print_changes(study: DesignStudy) -> None:
     print_table(title, rows, columns, legend)
     if study.requirements:
         more = f"; and {len(study.requirements) - 1} more" if len(study.requirements) > 1 else ""
-        warn(f"the unchanged gearbox fails requirements: {study.requirements[0]}{more}")
+        warn(f"requirements that the unchanged gearbox does not meet: {study.requirements[0]}{more}")
 
 
 def _decibels(value: float) -> str:

@@ -319,7 +319,7 @@ def _further(
 ) -> Iterator[tuple[str, list[str]]]:
     """Yield title and lines of the row of small cards."""
     if lines := list(_shortfalls(material)):
-        yield "Required life not reached", lines
+        yield "Requirements not met", lines
     if leaders := list(_leaders(material, headline, top)):
         yield "Highest in other quantities", leaders
     rated = material.context.gearbox.case.operation.rated_speed_rpm
