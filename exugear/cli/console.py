@@ -265,6 +265,14 @@ def exit_codes() -> Iterator[None]:
         end_with("Failed", _file_error_text(error), EXIT_FAILED)
     except MemoryError as error:
         end_with("Failed", f"out of memory ({error})" if str(error) else "out of memory", EXIT_FAILED)
+    except Exception as error:
+        # Loaded only after an error: a short command needs no compiler.
+        from fe_ste.tools.compilation import remove_damaged
+
+        if (folder := remove_damaged(error)) is None:
+            raise
+        text = f"{folder}: compiled kernels were damaged and have been removed; run the same command again"
+        end_with("Failed", text, EXIT_FAILED)
 
 
 def _file_error_text(error: OSError) -> str:

@@ -23,7 +23,7 @@ from exugear.steady.harmonics.linear_solvers import solve_lines
 from exugear.steady.harmonics.lines import add_answered, flat
 from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, MeshInterface, Spectra
 from fe_ste.tools.arrays import Complexes, Floats
-from fe_ste.tools.inner_kernels import cached_struct
+from fe_ste.tools.bundles import cached_bundle
 from fe_ste.tools.octets import SIZE
 
 TOLERANCE = 1e-9
@@ -140,7 +140,7 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
 
     def apply(readings: Complexes) -> Complexes:
         out = np.empty_like(readings)
-        add_answered(cached_struct(coupling.terms), *parts, readings, *memory, octets, out)
+        add_answered(cached_bundle(coupling.terms), *parts, readings, *memory, octets, out)
         return out
 
     given = given_forces(model, interface).reshape(shape[0], -1)

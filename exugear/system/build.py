@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -40,7 +40,6 @@ def assemble(
     flanks: Mapping[str, int] | None = None,
     angles: Angles = "reference",
     contact: Mapping[str, MeshContactState] | None = None,
-    before_balance: Callable[[Assembly], None] | None = None,
 ) -> Assembly:
     """Assemble the equations of motion of a gearbox.
 
@@ -54,8 +53,6 @@ def assemble(
         `exugear.system.bodies.of_gearbox` gives them.
     flanks, angles, contact
         As in `exugear.system.tooth_mesh.element.mesh_elements`.
-    before_balance
-        Called with the assembly before the static equilibrium that determines the bearing stiffness is solved.
 
     Raises
     ------
@@ -119,8 +116,6 @@ def assemble(
         motions=_rolling_motions(gearbox, coordinates) if only_rolls else np.eye(size),
         rows_stiffness=np.zeros((len(supports), 6, 6)),
     )
-    if before_balance is not None:
-        before_balance(assembly)
     return with_modal_damping(linearise_at_static_load(assembly))
 
 

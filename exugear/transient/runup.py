@@ -28,7 +28,7 @@ from exugear.system.signals import signal_layout
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.element import Angles, MeshData, friction_lack
 from exugear.transient.compiled.integrator import INTEGRATORS, choose_integration, fastest_motion
-from exugear.transient.compiled.solver import CompiledSystem, compile_loop_ahead, unsupported_reason
+from exugear.transient.compiled.solver import CompiledSystem, unsupported_reason
 from exugear.transient.outcome import LimitError, Progress, ProgressMeter, Run, RunError
 from exugear.transient.plan import SAMPLE_RATE, RunPlan, check_disk, check_duration, plan_run, too_fine
 from exugear.transient.recorder import Recorder
@@ -241,11 +241,7 @@ def simulate(
         duration = kept_duration(directory)
     check_duration(gearbox, case, duration, sample_rate)
 
-    def begin_to_compile(parts: Assembly) -> None:
-        if _solver(solver, parts, mesh_route) == "compiled":
-            compile_loop_ahead(parts)
-
-    assembly = assemble(gearbox, choice, stiffness, bodies, angles=angles, before_balance=begin_to_compile)
+    assembly = assemble(gearbox, choice, stiffness, bodies, angles=angles)
     if lack := friction_lack(assembly.elements):
         raise gearbox.error(lack)
     total = case.duration if duration is None else duration

@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
+from fe_ste.tools.bundles import cached_bundle
 from fe_ste.tools.compilation import kernel
-from fe_ste.tools.inner_kernels import cached_struct
 from fe_ste.tools.octets import SIZE, aligned_zeros, all_eight, eight, put
 
 # Linear equations of harmonic balance, solved without their matrix
@@ -219,7 +219,7 @@ def solve_side_by_side(
     numbers = amplitudes.view(np.float64)
     pencil = (stiffness[places], damping[places], mass[places])
     missing = np.empty(len(frequencies))
-    solve_octets(cached_struct(plan), *pencil, frequencies, given, memory[0], memory[1], x, numbers, missing)
+    solve_octets(cached_bundle(plan), *pencil, frequencies, given, memory[0], memory[1], x, numbers, missing)
     scale = np.abs(loads.sum(axis=1)).max() + 1e-3 * np.abs(loads).max()
     # A residual that is no number is none that is small.
     for line in np.flatnonzero(~(missing <= LEFT_OVER * scale)):

@@ -28,9 +28,9 @@ from typing import NamedTuple
 import numpy as np
 
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
+from fe_ste.tools.bundles import cached_bundle
 from fe_ste.tools.compilation import kernel
 from fe_ste.tools.display import ReprMixin
-from fe_ste.tools.inner_kernels import cached_struct
 from fe_ste.tools.octets import SIZE, all_eight, eight, put
 
 LARGEST_RATIO = 40
@@ -520,7 +520,7 @@ class HarmonicCoupling:
         values : (n, k)
         """
         real, imaginary = self.memory()
-        take_in(cached_struct(self.terms), *flat(functions), np.ascontiguousarray(values, complex), real, imaginary)
+        take_in(cached_bundle(self.terms), *flat(functions), np.ascontiguousarray(values, complex), real, imaginary)
         whole = (real + 1j * imaginary).reshape(len(values), -1)
         ends = np.cumsum(self.terms.room)
         return np.hstack(

@@ -40,8 +40,8 @@ from exugear.system.kernels.table_law import (
 from exugear.system.tooth_mesh.laws.line_of_action import curve_of
 from exugear.system.tooth_mesh.laws.table import damped_forces, flank_tangent
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.bundles import cached_bundle
 from fe_ste.tools.compilation import compiled, kernel
-from fe_ste.tools.inner_kernels import cached_struct
 
 TOUCHING = 0.25e-6
 """Approach over which the damping of teeth that touch sets in, m.
@@ -277,7 +277,7 @@ def sample_rolling(rolling: RollingArrays, law: int, readings: Floats) -> tuple[
     force = np.empty(readings.shape)
     slope = np.empty((*readings.shape, readings.shape[1]))
     _fill(
-        law, np.ascontiguousarray(readings), np.zeros(6), cached_struct(rolling), rolling_memory(rolling), force, slope
+        law, np.ascontiguousarray(readings), np.zeros(6), cached_bundle(rolling), rolling_memory(rolling), force, slope
     )
     return force, slope
 

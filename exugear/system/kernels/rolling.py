@@ -23,8 +23,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.bundles import cached_bundle
 from fe_ste.tools.compilation import kernel, summing_kernel
-from fe_ste.tools.inner_kernels import cached_struct
 
 ROLLER, BALL, ALIGNED_BALL = range(3)
 """Values of `FORM`."""
@@ -555,5 +555,5 @@ def rolling_loads(
     every = np.broadcast_to(numbers, turn.shape).flatten()
     memory = rolling_memory(rolling)
     out = (forces.reshape(-1, 6), torques.ravel())
-    pass_rolling(every, strains, rates, turn.ravel(), cached_struct(rolling), memory, *out)
+    pass_rolling(every, strains, rates, turn.ravel(), cached_bundle(rolling), memory, *out)
     return forces, torques

@@ -39,8 +39,8 @@ from exugear.transient.compiled.integrator import (
 from exugear.transient.compiled.packing import Equations, Work, equations_of, work_for
 from exugear.transient.compiled.sampling import Columns, columns_of, take_sample
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.compilation import compile_ahead, kernel
-from fe_ste.tools.inner_kernels import bundle
+from fe_ste.tools.bundles import bundle
+from fe_ste.tools.compilation import kernel
 from fe_ste.tools.octets import SIZE, all_eight, eight, put, sum_of
 
 # The loop over time as one compiled piece that allocates nothing per step: states, their signals and powers
@@ -278,14 +278,6 @@ def unsupported_reason(assembly: Assembly) -> str:
         family = assembly.gearbox.body(next(iter(assembly.floating))).family
         return f"bodies.{family}.flexibility = 'ffrf' requires Exudyn, 'nonrotating' runs in both"
     return ""
-
-
-def compile_loop_ahead(assembly: Assembly) -> None:
-    """Let the loop over time, most of all that compiles, be compiled while a state to start from is looked for."""
-    rest = np.zeros(assembly.size)
-    nothing = np.empty((0, 0))
-    system = CompiledSystem(assembly, rest, rest, LoadTable(), 1.0)
-    compile_ahead(advance, *system.arguments(np.empty(0), 0, 1, nothing, nothing, nothing, nothing))
 
 
 class CompiledSystem:

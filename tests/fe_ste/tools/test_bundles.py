@@ -8,7 +8,7 @@ import numba
 import numpy as np
 import pytest
 
-from fe_ste.tools.inner_kernels import bundle, cached_struct
+from fe_ste.tools.bundles import bundle, cached_bundle
 
 
 class Inner(NamedTuple):
@@ -37,8 +37,8 @@ def test_kernels_read_and_write_the_arrays_of_the_tuple() -> None:
 
 def test_the_same_tuple_keeps_its_bundle_and_another_has_its_own() -> None:
     one, two = (Inner(np.zeros(2), None) for _ in range(2))
-    assert cached_struct(one) is cached_struct(one)
-    assert cached_struct(one) is not cached_struct(two)
+    assert cached_bundle(one) is cached_bundle(one)
+    assert cached_bundle(one) is not cached_bundle(two)
 
 
 def test_arrays_in_another_order_are_refused() -> None:

@@ -89,8 +89,8 @@ from exugear.system.tooth_mesh.laws.table import (
     add_table_mesh,
 )
 from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.bundles import bundle, cached_bundle
 from fe_ste.tools.compilation import kernel
-from fe_ste.tools.inner_kernels import bundle, cached_struct
 
 # Laws along a row: force by the deflection and the position in the mesh cycle
 
@@ -305,7 +305,7 @@ def acting_table(meshes: MeshArrays) -> TableArrays | None:
 
 def _bundles(meshes: MeshArrays) -> tuple[MeshArrays, TableArrays | None]:
     table = acting_table(meshes)
-    return cached_struct(meshes), None if table is None else cached_struct(table)
+    return cached_bundle(meshes), None if table is None else cached_bundle(table)
 
 
 def _pass(q: Floats, v: Floats, meshes: MeshArrays, states: Floats, f: Floats, jq: Floats, jv: Floats) -> None:
