@@ -44,7 +44,7 @@ def page(results: Results) -> str:
 
 
 def in_short(results: Results) -> str:
-    """Lines for the README."""
+    """Lines for the page on computing time."""
     dynamics, tables, startup = results["dynamics"], results["tables"], results["startup"]
     rigid, bushing = (run_up_of(dynamics, variant) for variant in ("rigid", "bushing"))
     element, python = (
@@ -84,7 +84,7 @@ def in_short(results: Results) -> str:
             wrapped(
                 f"Two cores ({dynamics['machine']['processor']}), load average at the start {load:.2f}, up to "
                 f"{busy:.2f} cores busy with other work. All results, their limits, and growth with planets, stages "
-                "and table size: [benchmarks/results.md](benchmarks/results.md)."
+                "and table size: [benchmarks/results.md](../../benchmarks/results.md)."
             )
             + "\n",
         ]
@@ -97,7 +97,7 @@ def amplitudes(results: Results) -> str:
 
 
 QUOTES = {"in_short": in_short, "amplitudes": amplitudes}
-QUOTED = ("README.md", "docs/validation/dynamics.md")
+QUOTED = ("docs/reference/computing_time.md", "docs/validation/dynamics.md")
 """Documents that have figures between marks."""
 
 

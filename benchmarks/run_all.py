@@ -5,7 +5,7 @@
     python benchmarks/run_all.py --part startup  # measures one part again, keeps the others
     python benchmarks/run_all.py --render        # makes the tables anew of what is stored
 
-Writes ``results.json`` and ``results.md`` beside this file, and the figures that README.md and
+Writes ``results.json`` and ``results.md`` beside this file, and the figures that docs/reference/computing_time.md and
 docs/validation/dynamics.md quote. No figure in these is written by hand. A part that fails is named, the others are
 measured and kept, and the exit code is 1.
 """

@@ -36,6 +36,7 @@ extensions = [
     "claims_tables",
     "command_pages",
     "interface_pages",
+    "key_pages",
     "outside_pages",
     "room_pages",
 ]
@@ -73,6 +74,7 @@ html_theme = "pydata_sphinx_theme"
 html_title = f"exugear {release}"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+html_search_scorer = "tools/search_order.js"
 html_show_sourcelink = False
 html_copy_source = False
 html_theme_options = {

@@ -60,13 +60,12 @@ def test_a_verb_has_the_options_that_are_shown(words: list[str]) -> None:
 
 @pytest.mark.validation
 def test_a_gearbox_of_ones_own_goes_from_file_to_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The lines with a path of the environment, as a user types them; a moment of the run-up."""
+    """The lines with a path of the environment, as a user types them."""
     monkeypatch.chdir(tmp_path)
     lines = [line.split()[1:] for line in COMMANDS if line.startswith(".venv/bin/exugear")]
-    assert [words[0] for words in lines] == ["new", "run", "report"]
+    assert [words[0] for words in lines] == ["new", "steady", "report"]
     for words in lines:
-        more = ["--duration", "0.05"] if words[0] == "run" else []
-        outcome = CliRunner().invoke(app, [*words, *more])
+        outcome = CliRunner().invoke(app, words)
         assert outcome.exit_code == 0, outcome.output
     results = tmp_path / "results" / "my"
     # The three commands give all that the page shows: modes and a steady-state response are computed by the last one.
