@@ -1,26 +1,39 @@
-"""What all tests share, those of docstrings too: flanks and contacts computed once, kept until the tests end.
+"""What all tests share, those of docstrings too: flanks and contacts computed once for these sources.
 
 They read and write none in the user's cache folder.
 """
 
-import atexit
+import hashlib
 import os
 import shutil
-import tempfile
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+ROOT = Path(__file__).parent
+SOURCES_KEPT = 3
+"""Versions of the sources whose flanks stay: `make validate` after `make test`, and branches that one goes back to."""
+
+
+def folder_of_flanks() -> Path:
+    """Return the folder of the flanks that the present sources compute; remove those of sources of long ago."""
+    digest = hashlib.sha256()
+    for file in sorted((ROOT / "fe_ste").rglob("*.py")):
+        digest.update(file.read_bytes())
+    kept = ROOT / ".pytest_cache" / "flanks"
+    folder = kept / digest.hexdigest()[:16]
+    folder.mkdir(parents=True, exist_ok=True)
+    os.utime(folder)
+    by_use = sorted(kept.iterdir(), key=lambda old: old.stat().st_mtime, reverse=True)
+    for old in by_use[SOURCES_KEPT:]:
+        shutil.rmtree(old, ignore_errors=True)
+    return folder
+
+
 # Processes that work side by side are started by this one and share its folder.
 if "PYTEST_XDIST_WORKER" not in os.environ:
-    KEPT = os.environ["EXUGEAR_FLANKS"] = tempfile.mkdtemp(prefix="exugear-tests-")
-    OWNER = os.getpid()
-
-    @atexit.register
-    def remove_what_was_kept() -> None:
-        """At the end of this process, not of its forks."""
-        if os.getpid() == OWNER:
-            shutil.rmtree(KEPT, ignore_errors=True)
+    os.environ["EXUGEAR_FLANKS"] = str(folder_of_flanks())
 
 
 @pytest.hookimpl(tryfirst=True)
