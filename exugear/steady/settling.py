@@ -15,7 +15,7 @@ from exugear.steady.harmonics.lines import LineSet
 from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.steady.mean_system.rotating_frame import PlanetSet, RotatingFrame
 from exugear.system.kernels.coordinates import TILT
-from exugear.system.loads import DriveLaw, LoadTable
+from exugear.system.loads import Drive, LoadTable
 from exugear.transient.compiled.solver import CompiledSystem, unsupported_reason
 from fe_ste.tools.arrays import Complexes, Floats, Integers
 
@@ -162,7 +162,7 @@ class SettlingRun:
         stiffness = self._inertia * rate**2
         damping = 1.4 * self._inertia * rate
         law = (float(q[pinned]), self._speed, 0.0)
-        drive = DriveLaw(assembly.gearbox.case.overall.input, stiffness, damping, law)
+        drive = Drive(assembly.gearbox.case.overall.input, stiffness, damping, law)
         run = CompiledSystem(assembly, q, v, LoadTable(self._torques, drive=drive), self._step)
         states = np.empty((self._steps, assembly.size))
         speeds = np.empty_like(states)

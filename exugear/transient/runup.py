@@ -121,7 +121,7 @@ def _integrate_in_exudyn(plan: RunPlan, start: RunStart, recorder: Recorder, int
 
     state = start.state
     step = plan.step
-    system = ExudynSystem(plan.assembly, state.q, state.v, start.loads.as_functions(), plan.mesh_route)
+    system = ExudynSystem(plan.assembly, state.q, state.v, start.loads, plan.mesh_route)
     follow = _StepFollower(plan, start, recorder, interruption)
     try:
         system.run(state.step * step, plan.steps - state.step, step, follow, not plan.is_implicit)

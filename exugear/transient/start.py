@@ -31,7 +31,7 @@ from exugear.results.run_file import (
     kept_attributes,
     load_run,
 )
-from exugear.system.loads import DriveLaw, LoadTable
+from exugear.system.loads import Drive, LoadTable
 from exugear.system.signals import BALANCE_TERMS, MESH_TIMES, POWERS, SignalLayout, signal_layout
 from exugear.system.statics import accelerating_start
 from exugear.system.system import Assembly
@@ -213,7 +213,7 @@ def _load_table(
     """Gather what acts from outside; a drive starts ahead by an angle (rad)."""
     drive = None
     if case.driven_body is not None and case.drive_stiffness is not None:
-        drive = DriveLaw(
+        drive = Drive(
             body=case.driven_body,
             stiffness=case.drive_stiffness,
             damping=gearbox.case.damping.coupling_time_s * case.drive_stiffness,
