@@ -20,7 +20,7 @@ from exugear.gearbox.sections.connections import (
 )
 from exugear.gearbox.sections.entries import GROUND
 from exugear.gearbox.sections.gears import GearSection, PinSection
-from exugear.gearbox.units import MM, RPM, UM
+from exugear.gearbox.units import MM, RPM, UM, optional_si, si
 from fe_ste.geometry.cylinders import MassProperties, Tube, mass_properties, together
 
 # Bodies, position errors of planet pins, and load cases
@@ -120,7 +120,7 @@ def _computed_inertia(origin: Origin, family: str, section: BodySection) -> Iner
     rings: list[MassProperties] = []
     shape = section.shape
     if shape is not None:
-        start = MM * shape.start_z_mm
+        start = si(shape, "start_z_mm")
         for piece in shape.sections:
             tubes.append(_tube(piece, start, shape.material.density_kg_per_m3))
             start += tubes[-1].length
@@ -164,24 +164,22 @@ def blank_places(case: GearboxFile, family: str) -> dict[str, float]:
 
 
 def _tube(piece: ShaftSectionSection, start: float, density: float) -> Tube:
-    ends = (piece.outer_diameter_end_mm, piece.inner_diameter_end_mm)
-    outer_end, inner_end = (None if end is None else MM * end for end in ends)
     return Tube(
         start=start,
-        length=MM * piece.length_mm,
-        outer=MM * piece.outer_diameter_mm,
-        inner=MM * piece.inner_diameter_mm,
+        length=si(piece, "length_mm"),
+        outer=si(piece, "outer_diameter_mm"),
+        inner=si(piece, "inner_diameter_mm"),
         density=density,
-        outer_end=outer_end,
-        inner_end=inner_end,
+        outer_end=optional_si(piece, "outer_diameter_end_mm"),
+        inner_end=optional_si(piece, "inner_diameter_end_mm"),
     )
 
 
 def gear_tube(gear: GearSection, z: float, shaft: Sequence[Tube]) -> Tube:
     """Gear body on a shaft: a tube up to the reference circle, centred on the face width at z (m)."""
-    reference = MM * gear.teeth * gear.normal_module_mm / math.cos(math.radians(gear.helix_angle_deg))
-    width = MM * gear.face_width_mm
-    held = MM * gear.held_diameter_mm
+    reference = MM * gear.teeth * gear.normal_module_mm / math.cos(si(gear, "helix_angle_deg"))
+    width = si(gear, "face_width_mm")
+    held = si(gear, "held_diameter_mm")
     under = [one.outer for one in shaft if one.start < z + 0.5 * width and one.start + one.length > z - 0.5 * width]
     inner, outer = (reference, held) if gear.internal else (min(max([held, *under]), reference), reference)
     density = gear.material.density_kg_per_m3
@@ -273,10 +271,10 @@ def load_cases(origin: Origin, spinning: Sequence[str]) -> dict[str, LoadCase]:
             torques=dict(section.torques_N_m),
             torque_series=series,
             duration=section.duration_s,
-            start_speed=section.start_speed_rpm * RPM,
+            start_speed=si(section, "start_speed_rpm"),
             start_speeds={body: speed * RPM for body, speed in section.start_speeds_rpm.items()},
             driven_body=section.driven_body,
-            end_speed=None if section.end_speed_rpm is None else section.end_speed_rpm * RPM,
+            end_speed=optional_si(section, "end_speed_rpm"),
             drive_stiffness=section.drive_stiffness_N_m_per_rad,
             description=section.description,
         )
@@ -385,7 +383,7 @@ def _couplings_on_fixed_bodies(origin: Origin, bodies: Mapping[str, Body]) -> It
         seat = origin.case.bearings.get(section.seat or "")
         place = bodies[body].centre_of_mass_z
         if seat is not None:
-            place = MM * seat.z_mm
+            place = si(seat, "z_mm")
         damping = section.damping_N_m_s_per_rad
         if damping is None:
             damping = damping_times(origin.case.damping).coupling * section.stiffness_N_m_per_rad

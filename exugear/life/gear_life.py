@@ -19,7 +19,7 @@ import numpy as np
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.sections.loads import RatingSection, StrengthSection
-from exugear.gearbox.units import MPA, UM
+from exugear.gearbox.units import MPA, UM, si
 from exugear.gearbox.versions import LIFE
 from exugear.life.dynamic_factors import DynamicFactor
 from exugear.life.load_spectrum.counted import FLANKS, ToothExposure
@@ -336,7 +336,7 @@ class _RatedTooth:
         contact, bending = life_curves(strength)
         allowed = self._contact_strength(strength, speed)[:, None, None]
         endured = root_strength(strength, self.pair, self.tooth.member)
-        static = MPA * strength.sigma_H_lim_MPa * contact.factors[0]
+        static = si(strength, "sigma_H_lim_MPa") * contact.factors[0]
         by_contact = damages(contact, hertz / allowed, 1.0, cycles).sum(axis=(1, 2))
         by_root = damages(bending, root, endured, cycles).sum(axis=(1, 2))
         values = (
@@ -380,7 +380,7 @@ class _RatedTooth:
         still = lubricant_factor(softer, self.gearbox.viscosity_40)
         still *= roughness_factor(softer, roughness, reduced_radius(self.pair))
         moving = np.array([velocity_factor(softer, self._velocity(float(one))) for one in speed])
-        return MPA * strength.sigma_H_lim_MPa * still * moving
+        return si(strength, "sigma_H_lim_MPa") * still * moving
 
     def _velocity(self, speed: float) -> float:
         """Return the pitch line velocity (m/s) at a speed (rad/s) of the loaded body."""
@@ -406,7 +406,7 @@ def root_factors(strength: StrengthSection, pair: GearPair, member: int) -> tupl
     notch = root_stress_factors(pair, member).notch
     return (
         notch_factor(notch, hardening),
-        surface_factor(UM * strength.root_roughness_Rz_um),
+        surface_factor(si(strength, "root_roughness_Rz_um")),
         size_factor(pair.pinion.normal_module, hardening),
     )
 
@@ -415,7 +415,7 @@ def root_strength(strength: StrengthSection, pair: GearPair, member: int) -> flo
     """Return the root strength (Pa) of a gear for a life factor of one."""
     both_ways = strength.mean_stress_factor or 1.0
     factors = math.prod(root_factors(strength, pair, member))
-    return MPA * strength.sigma_F_lim_MPa * PLAIN_TEST_GEAR * factors * both_ways
+    return si(strength, "sigma_F_lim_MPa") * PLAIN_TEST_GEAR * factors * both_ways
 
 
 def life_curves(strength: StrengthSection) -> tuple[LifeCurve, LifeCurve]:

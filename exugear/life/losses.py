@@ -19,7 +19,7 @@ import scipy.optimize
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import summarise_loads
 from exugear.gearbox.parts import Mesh
-from exugear.gearbox.units import MM, RPM, UM
+from exugear.gearbox.units import MM, RPM, UM, si
 from exugear.life.gear_life import RZ_OF_RA, roughness_of
 from exugear.life.power_flow import power_flow
 from exugear.system.bearings.duty import BearingLoadState
@@ -371,7 +371,7 @@ def _seal_losses(gearbox: Gearbox, speeds: Mapping[str, float]) -> tuple[SealLos
     for name, seal in gearbox.case.seals.items():
         relative = abs(speeds.get(seal.body, 0.0) - speeds.get(seal.on, 0.0))
         loss = SEAL_LOSS * seal.diameter_mm**2 * relative / RPM
-        found.append(SealLoss(name, MM * seal.diameter_mm, relative, loss))
+        found.append(SealLoss(name, si(seal, "diameter_mm"), relative, loss))
     return tuple(found)
 
 

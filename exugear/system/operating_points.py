@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from exugear.gearbox.parts import Bearing, Body
-from exugear.gearbox.units import KN
+from exugear.gearbox.units import optional_si, si
 from exugear.system.bearings.duty import BearingLoadState, OperatingPoint, duty_of, operating_point
 from exugear.system.bearings.rolling.catalogue import catalogue_rows
 from exugear.system.bearings.rolling.contact import bearing_load, equilibrium, row_contacts
@@ -325,7 +325,7 @@ def bearing_points(assembly: Assembly) -> tuple[OperatingPoint, ...]:
 def _stated_point(bearing: Bearing) -> OperatingPoint:
     """Operating point of a bearing whose load the file states: along x, the stiffness the same in all directions."""
     assert bearing.catalogue is not None and bearing.catalogue.radial_load_kN is not None
-    force = (KN * bearing.catalogue.radial_load_kN, 0.0, KN * (bearing.catalogue.axial_load_kN or 0.0))
+    force = (si(bearing.catalogue, "radial_load_kN"), 0.0, optional_si(bearing.catalogue, "axial_load_kN") or 0.0)
     displacement = equilibrium(BearingOfRows(catalogue_rows(bearing.catalogue)), force).displacement
     return replace(operating_point(bearing, displacement, False), stiffness=catalogue_stiffness(bearing.catalogue))
 

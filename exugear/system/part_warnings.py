@@ -18,7 +18,7 @@ from exugear.gearbox.load_cases import operating_range, summarise_loads
 from exugear.gearbox.parts import Bearing, Body, PairSpec
 from exugear.gearbox.sections.connections import CatalogueSection
 from exugear.gearbox.sections.designations import boundary_of
-from exugear.gearbox.units import MM, RPM
+from exugear.gearbox.units import MM, RPM, si
 from fe_ste.geometry.checks import USUAL_TIP_THICKNESS
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.standards.pitting import nominal_contact_stress
@@ -74,7 +74,7 @@ def _speed_limits(gearbox: Gearbox) -> Iterator[str]:
     at = f"at {fastest / RPM:.4g} rpm of {gearbox.case.overall.input}"
     for name, seal in gearbox.case.seals.items():
         turns = abs(speeds.get(seal.body, 0.0) - speeds.get(seal.on, 0.0))
-        speed = 0.5 * MM * seal.diameter_mm * turns
+        speed = 0.5 * si(seal, "diameter_mm") * turns
         if speed > seal.speed_limit_m_per_s:
             usual = "" if "speed_limit_m_per_s" in seal.model_fields_set else " usual for nitrile rubber (NBR)"
             yield (
@@ -182,7 +182,7 @@ def _seats(gearbox: Gearbox) -> Iterator[str]:
 def _bores_beside(gearbox: Gearbox, body: Body, place: float) -> tuple[float, float] | None:
     """Bores (m) of the nearest bearings of a body on both sides of a place on it; None without both."""
     known = [
-        (bearing.position[2], MM * bearing.catalogue.bore_mm)
+        (bearing.position[2], si(bearing.catalogue, "bore_mm"))
         for bearing in gearbox.bearings
         if bearing.catalogue is not None and bearing.body == body.name
     ]
@@ -198,10 +198,10 @@ def _shaft_under(gearbox: Gearbox, body: Body, gear: Gear, place: float) -> floa
     section = gearbox.case.bodies.get(body.family)
     if section is None or section.shape is None:
         return None
-    start = MM * section.shape.start_z_mm
+    start = si(section.shape, "start_z_mm")
     found = []
     for piece in section.shape.sections:
-        end = start + MM * piece.length_mm
+        end = start + si(piece, "length_mm")
         if start < place + 0.5 * gear.face_width and end > place - 0.5 * gear.face_width:
             found.append(MM * min(piece.outer_diameter_mm, piece.outer_diameter_end_mm or piece.outer_diameter_mm))
         start = end
@@ -332,7 +332,7 @@ def _clash(gear: Gear, place: float, bearing: Bearing) -> float:
 
 def _width(catalogue: CatalogueSection) -> float:
     """Width of a bearing with all its rows, m."""
-    return (1 if catalogue.arrangement == "single" else 2) * MM * catalogue.width_mm
+    return (1 if catalogue.arrangement == "single" else 2) * si(catalogue, "width_mm")
 
 
 # How near gear pairs are to what tables cut off or what wears out: form circles, tips, pressure at the pitch point

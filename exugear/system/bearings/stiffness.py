@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Bearing, Body, connector_matrix
 from exugear.gearbox.sections.connections import CatalogueSection
-from exugear.gearbox.units import KN
+from exugear.gearbox.units import optional_si, si
 from exugear.gearbox.variant import Variant
 from exugear.system.bearings.rolling.catalogue import catalogue_rows
 from exugear.system.bearings.rolling.contact import pitch_averaged_tangent
@@ -326,7 +326,7 @@ def catalogue_stiffness(section: CatalogueSection) -> Floats:
     """
     rows = catalogue_rows(section)
     if section.radial_load_kN is not None:
-        force = (KN * section.radial_load_kN, 0.0, KN * (section.axial_load_kN or 0.0))
+        force = (si(section, "radial_load_kN"), 0.0, optional_si(section, "axial_load_kN") or 0.0)
     else:
         force = holding_force(rows, NOMINAL_LOAD * basic_dynamic_rating(rows, section.type))
     return axially_symmetric(pitch_averaged_tangent(BearingOfRows(rows), force))

@@ -28,7 +28,7 @@ from exugear.gearbox.sections.connections import (
     BearingType,
     CatalogueSection,
 )
-from exugear.gearbox.units import KN, MM, UM
+from exugear.gearbox.units import KN, MM, UM, si
 from exugear.system.bearings.rolling import dimensions
 from exugear.system.bearings.rolling.rows import BallRow, BearingError, RollerRow, RollingRow, moved, pair_rows, rib_row
 
@@ -313,7 +313,7 @@ def _thermal_change(section: CatalogueSection) -> float:
 def _roller_row(section: CatalogueSection) -> RollerRow:
     """One row in the middle of the bearing, without its contact angle."""
     common = _common(section)
-    length = MM * _given(section, "element_length_mm")
+    length = si(section, "element_length_mm")
     profile: dict[str, Any] = {}
     if section.type in SPHERES:
         raceway = _outer_raceway_radius(section)
@@ -337,7 +337,7 @@ def _outer_raceway_radius(section: CatalogueSection) -> float:
 def _ball_row(section: CatalogueSection) -> BallRow:
     """One row in the middle of the bearing, without its contact angle."""
     if section.type == "self_aligning_ball":
-        outer = _outer_raceway_radius(section) / (MM * _given(section, "element_diameter_mm"))
+        outer = _outer_raceway_radius(section) / si(section, "element_diameter_mm")
     else:
         outer = _given(section, "outer_groove_ratio")
     return BallRow(**_common(section), inner_conformity=_given(section, "inner_groove_ratio"), outer_conformity=outer)
@@ -350,8 +350,8 @@ def _placed(section: CatalogueSection, row: RollerRow | BallRow) -> tuple[Rollin
     if section.type == "four_point_ball":
         return tuple(moved(row, each, 0.0) for each in (-angle, angle))
     if section.arrangement != "single":
-        distance = MM * _given(section, "row_distance_mm")
-        preload = UM * section.axial_preload_um
+        distance = si(section, "row_distance_mm")
+        preload = si(section, "axial_preload_um")
         return pair_rows(moved(row, signed, 0.0), section.arrangement, distance, preload)
     if section.type == "thrust_spherical_roller":
         # All rollers press on one point of the axis, beside the bearing.
@@ -362,7 +362,7 @@ def _placed(section: CatalogueSection, row: RollerRow | BallRow) -> tuple[Rollin
         # Both rows point to the middle of the bearing.
         place = 0.5 * row.pitch_diameter * math.tan(angle)
         return moved(row, -angle, -place), moved(row, angle, place)
-    distance = MM * _given(section, "row_distance_mm") if rows > 1 else 0.0
+    distance = si(section, "row_distance_mm") if rows > 1 else 0.0
     return tuple(moved(row, signed, (number - 0.5 * (rows - 1)) * distance) for number in range(rows))
 
 
@@ -370,7 +370,7 @@ def _ribs(section: CatalogueSection, row: RollerRow | BallRow) -> tuple[RollerRo
     """Ribs of cylindrical rollers as rows of their own, first those that hold the inner ring against +z."""
     if section.ribs == "none" or not isinstance(row, RollerRow):
         return ()
-    length = MM * _given(section, "rib_contact_mm")
+    length = si(section, "rib_contact_mm")
     senses = {"+z": (1,), "-z": (-1,), "both": (1, -1)}[section.ribs]
     return tuple(rib_row(row, sense, length) for sense in senses)
 
