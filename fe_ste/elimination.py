@@ -280,8 +280,6 @@ def _dense_columns(vectors: Floats | SparseMatrix) -> Floats:
     return np.asfortranarray(dense, dtype=np.float64)
 
 
-# Dense linear algebra in place, by SciPy's BLAS and LAPACK, on parts of arrays and without Python's lock
-
 #: Columns eliminated at a time: the triangular solves, three to five times slower than products, stay a small part.
 _PANEL = 64
 

@@ -40,8 +40,6 @@ from fe_ste.geometry.gears import Gear
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 
-# Flank topography: material removed over a grid of radii and axial positions, as a gear measuring machine gives it
-
 
 @dataclass(frozen=True)
 class FlankTopography(ReprMixin):
@@ -177,9 +175,6 @@ def _interval(nodes: Floats, at: Floats) -> tuple[Integers, Floats]:
     within = np.clip(at, nodes[0], nodes[-1])
     interval = np.clip(np.searchsorted(nodes, within, side="right") - 1, 0, len(nodes) - 2)
     return interval, (within - nodes[interval]) / (nodes[interval + 1] - nodes[interval])
-
-
-# Flank modifications: material removed from the involute flank, as a gap over the flank
 
 
 class ReliefShape(StrEnum):

@@ -30,8 +30,6 @@ from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.threads import one_dense_thread
 from fe_ste.transmission_error.contact_stress import PATH_MARGIN
 
-# Strain gauges on the root of a tooth: surface strains as linear read-outs of a sector's displacements
-
 COMPONENTS = 3
 """Strains of a gauge: along the section, along the face, shear."""
 
@@ -133,8 +131,6 @@ def gauge_columns(mesh: SectorMesh, places: GaugePlaces) -> SparseMatrix:
     return matrix.tocsr()
 
 
-# Root stress of a gear by loads on its flanks: the gauges' stress in the closed ring, tooth by tooth
-
 REACH = 3
 """Teeth on either side of the loaded one whose roots are read: beyond, less than a hundredth is felt."""
 
@@ -235,8 +231,6 @@ def _stress(gear: Gear, strain: Floats) -> Floats:
         axis=1,
     )
 
-
-# Stress of a pair over its mesh cycle from the line loads of a table: Hertz at the flanks, bending at the roots
 
 CLEAR_OF_FILLET = 0.5
 """Modules along the flank from its end above the fillet within which a load acts no nearer to the gauges."""

@@ -23,8 +23,6 @@ from exugear.gearbox.sections.gears import GearSection, PinSection
 from exugear.gearbox.units import MM, RPM, UM, optional_si, si
 from fe_ste.geometry.cylinders import MassProperties, Tube, mass_properties, together
 
-# Bodies, position errors of planet pins, and load cases
-
 
 def damping_times(section: DampingSection) -> DampingTimes:
     """Return damping over stiffness; zero where the file states the damping of modes.
@@ -280,9 +278,6 @@ def load_cases(origin: Origin, spinning: Sequence[str]) -> dict[str, LoadCase]:
         )
 
     return part_of_each(load_case, origin.case.load_cases)
-
-
-# Supports of bodies and connections of their rotations: joints, bearings, mounts, couplings
 
 
 def joints(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Joint, ...]:

@@ -73,8 +73,6 @@ def torque_series(gearbox: Gearbox, case: LoadCase) -> dict[str, tuple[Floats, F
     return series
 
 
-# Effect of a load case on the kinematic gear train: net torque, speeds, and loaded flanks of the meshes
-
 Series = Mapping[str, tuple[Floats, Floats]]
 BURSTING_RIM_SPEED = 300.0
 """Circumferential speed that no steel gear survives, m/s: density times its square is 0.7 GPa, the yield strength of

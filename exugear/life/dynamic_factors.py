@@ -155,8 +155,6 @@ def merged(parts: list[tuple[Floats, Floats]], least: float, source: str) -> Dyn
     return DynamicFactor(speed[order], value[order], least, source)
 
 
-# Dynamic factor K_v from the source in the gearbox file: stated value, run, or steady-state response
-
 WINDOWS = 4
 """Number of windows at each speed, to include slow beats between meshes."""
 SAMPLES = 6

@@ -27,8 +27,6 @@ from fe_ste.root_stress import MeshCycleStress
 from fe_ste.standards.iso6336 import outside_scope
 from fe_ste.tools.display import ReprMixin
 
-# Summary of a rating: parts that fail, parts below required values, and pairs that need relief
-
 LEAST_OUTSIDE = 0.01
 """Fraction of the load outside the path of contact below which no relief is recommended."""
 LARGEST_REACH = 2.5
@@ -170,8 +168,6 @@ def _relief_in_words(gearbox: Gearbox, name: str) -> str:
         return ""
     return f"{modification.tip_relief_um:g} µm of tip relief on {name}"
 
-
-# Rating and life of a gearbox under its load spectrum: gears by flank, bearings, extreme loads, limiting parts
 
 TOLD_SHARING = 1.0005
 """K_gamma of a single mesh above which it is reported, as rotor loads then change tooth forces."""

@@ -206,9 +206,6 @@ def _entries(dataset: xr.Dataset, name: str, numbers: Sequence[str]) -> Iterator
         yield {name: label, **told, **{key: _number(value) for key, value in given if not math.isnan(value)}}
 
 
-# Ratings in a results folder that belong to its gearbox file
-
-
 @dataclass(frozen=True)
 class StoredLife:
     """File of a rating."""

@@ -41,8 +41,6 @@ from fe_ste.tools.threads import side_by_side
 if TYPE_CHECKING:
     import xarray as xr
 
-# Modes followed over speed: which mode at one speed is which at the next
-
 Found: TypeAlias = tuple[Complexes, Complexes, Complexes]
 """Eigenvalues (n,), right and left shapes (n, 2 size), as `exugear.steady.mean_system.mean_system` gives them."""
 CLEAR = 0.8
@@ -170,7 +168,7 @@ def _joined(speeds: Floats, found: list[Found]) -> ModeTracks:
     return ModeTracks(speeds, eigenvalues[:, order], shapes[:, order], partners[:, order])
 
 
-# What modes of the mean system are: types of planetary sets, who moves how in words, the sense of a whirl
+# Description of modes: types of planetary sets, moving parts, whirl
 
 KINDS = ("rotational", "translational", "planet")
 """Types of modes of a planetary set."""
@@ -306,8 +304,6 @@ def circle(x: complex, y: complex) -> float:
     """
     return float(0.0 - 2.0 * (np.conj(x) * y).imag)
 
-
-# Campbell diagram of a mean system: eigenfrequencies and damping over speed, each mode named, and read from a file
 
 LAYOUT: dict[str, tuple[str, ...]] = {
     "campbell_speed": ("campbell_point",),

@@ -265,7 +265,7 @@ def improved(mode: Mode, mass: Floats, damping: Floats, stiffness: Floats) -> Mo
     return Mode(value, right, left)
 
 
-# What makes a peak: which mesh's error excites it, which mode carries it, and what would lower it, in percent
+# Cause of a peak: exciting mesh, mode, and sensitivity
 
 LEAST_MODE = 0.01
 """Minimum share of a mode to be reported."""

@@ -483,8 +483,6 @@ def _mean_of_waves(there: Floats, back: Floats, slopes: Floats) -> Floats:
     return found
 
 
-# Stability of steady states: what varying meshes do to a disturbance
-
 SMOOTH_KICKS, PARTING_KICKS = 400, 1000
 """Minimum number of kicks per period, without and with contact loss, whose instants have to be resolved."""
 ROLLING = 2

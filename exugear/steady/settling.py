@@ -19,8 +19,6 @@ from exugear.system.loads import Drive, LoadTable
 from exugear.transient.compiled.solver import CompiledSystem, unsupported_reason
 from fe_ste.tools.arrays import Complexes, Floats, Integers
 
-# Motions in time as the rotating frame sees them: its coordinates from those of the assembly, at many instants
-
 
 def frame_coordinates(frame: RotatingFrame, q: Floats, psi: Floats) -> Floats:
     """Coordinates u (s, size) in the rotating frame: what `RotatingFrame.state` makes q (s, size) of, turned round.
@@ -65,8 +63,6 @@ def _rotated(plane: Floats, angle: Floats) -> Floats:
     s = np.sin(angle)
     return np.stack([c * plane[:, 0] - s * plane[:, 1], s * plane[:, 0] + c * plane[:, 1]], axis=1)
 
-
-# Runs in time at constant speed until the motion repeats, and the lines of what they settle to
 
 PERIODS = 80
 """Periods of the slowest base in one leg of a run; lines are fitted over its second half."""

@@ -302,8 +302,6 @@ def _journal_form(values: Values) -> Any:
     return json_number(float(values))
 
 
-# Executors: this process, worker processes, a Dask cluster, or any executor of that protocol
-
 CONNECT_SECONDS = 30.0
 """Time limit for the answer of a scheduler, s."""
 

@@ -236,9 +236,6 @@ def _has_axes(choice: Choice) -> bool:
     return law is not None and law.needs_axes
 
 
-# Results of one point, each computed once when an output requires it
-
-
 class PointError(RuntimeError):
     """Error: a point cannot provide an output."""
 

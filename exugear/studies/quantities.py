@@ -98,9 +98,6 @@ def _fits(value: object, kind: str) -> bool:
     return isinstance(value, _TYPES[kind]) and (kind == "bool" or not isinstance(value, bool))
 
 
-# Outputs of eigenmodes
-
-
 def frequencies(results: PointResults, *, count: int = 12) -> dict[str, float]:
     """Eigenfrequencies, the lowest first, without free rotation."""
     modes = results.modes
@@ -188,8 +185,6 @@ def planet_values(results: PointResults, family: str, values: Floats) -> Floats:
     return np.asarray(values[..., chosen], dtype=np.float64)
 
 
-# Outputs of runs in time
-
 SETTLING = 0.25
 """Fraction of a run at its beginning that is skipped."""
 OVERALL = "overall_dte"
@@ -269,9 +264,6 @@ def _order_amplitudes(results: PointResults, signal: str, orders: list[float], s
     weights = 1.0 - np.cos(2.0 * math.pi * angle[:whole] / angle[whole])
     weighed = weights * values[:whole] * (2.0 / weights.sum())
     return [float(abs(np.exp(-1j * order * angle[:whole]) @ weighed)) for order in orders]
-
-
-# Outputs of steady-state responses over speed
 
 
 def nearest_names(name: str, known: Sequence[str]) -> str:

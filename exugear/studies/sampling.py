@@ -265,8 +265,6 @@ def _named(content: Any, pattern: list[str], before: str = "") -> Iterator[str]:
         yield from _named(inner, rest, f"{before}.{name}" if before else name)
 
 
-# Points of a study: all combinations of listed values with all draws, as values by path in the gearbox file
-
 MOST_POINTS = 10_000_000
 SAMPLE = "sample"
 """Dimension of draws."""

@@ -64,8 +64,6 @@ from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.versions import TABLE
 
-# Checks of a study before any point is computed: reserved names, equal points, options out of range
-
 OF_POINTS = ("error", "doubts", "seconds", "memory")
 """Variables of a dataset for each point in addition to its outputs."""
 OF_SEARCHES = ("evaluation", "on_front", "meets_limits")
@@ -304,9 +302,6 @@ def _listed(names: Sequence[str]) -> str:
     """Return a list of at most twelve names as text."""
     shown = list(itertools.islice(names, 12))
     return (", ".join(shown) or "none") + (f" and {len(names) - len(shown)} more" if len(names) > len(shown) else "")
-
-
-# Study (gearbox, varied points and outputs), read from a file and checked
 
 
 @dataclass(frozen=True)

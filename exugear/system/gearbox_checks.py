@@ -27,8 +27,6 @@ from exugear.system.part_warnings import pair_warnings, part_warnings
 from exugear.system.tooth_mesh.placement import MeshError, line_of_action_row, loaded_flanks, tooth_places
 from fe_ste.tools.arrays import Floats
 
-# What bearings and meshes leave free: a body without stiffness in some direction has no static state
-
 TILT_LENGTH = 0.1
 """Length (m) that turns a tilt into a displacement, so that both are compared."""
 HOLDING_SHARE = 1e-10
@@ -139,8 +137,6 @@ def _rolling_motions(gearbox: Gearbox, moving: list[Body], starts: Mapping[str, 
             motions[:, begin : begin + 2] = np.outer(spins[body.carrier], [-y, x])
     return np.asarray(np.linalg.qr(motions.T)[0].T)
 
-
-# Quick construction of all parts of a gearbox: errors of later steps are reported before these start
 
 MOST_STATES = 200_000
 """Most states of one table: at 50 ms each, three hours."""

@@ -38,8 +38,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-# Where the energy of modes sits: kinetic by body and motion, strain by element, and what moves in words
-
 BODY_MOTIONS = ("spin", "radial", "axial", "tilt", "bending", "twist", "stretch", "deformation")
 """What a body does: four motions as a rigid body, three deformations of an elastic shaft, the last of other bodies."""
 RIGID_MOTIONS = slice(0, 4)
@@ -155,8 +153,6 @@ def participation(overall: Floats) -> Floats:
     squares = overall**2
     return np.asarray(squares / max(float(squares.sum()), 1e-300))
 
-
-# Eigenmodes of a gearbox variant: frequencies, damping, where the energy sits, and what moves in words
 
 RIGID_COORDINATES = ("x", "y", "z", "tilt_x", "tilt_y", "spin")
 FREE_ROTATION = "rigid-body rotation"

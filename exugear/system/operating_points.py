@@ -301,9 +301,6 @@ def _what_holds_one_way(laws: Sequence[SupportLaw], names: Sequence[str]) -> str
     return f"{', '.join(one_way)}: located axially in one direction only; check arrangements and `locates_towards`"
 
 
-# What all catalogue bearings and all meshes of a gearbox bear under its static load
-
-
 def bearing_points(assembly: Assembly) -> tuple[OperatingPoint, ...]:
     """Operating points of all catalogue bearings; those with a load in the file are taken at that load.
 

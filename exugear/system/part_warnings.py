@@ -335,7 +335,7 @@ def _width(catalogue: CatalogueSection) -> float:
     return (1 if catalogue.arrangement == "single" else 2) * si(catalogue, "width_mm")
 
 
-# How near gear pairs are to what tables cut off or what wears out: form circles, tips, pressure at the pitch point
+# Margins of gear pairs: form circles, tips, pressure at the pitch point
 
 LEAST_FORM_MARGIN = 0.02
 """Minimum part of a flank between the mating gear's tip and the root form diameter.

@@ -456,7 +456,7 @@ def energy_residual(data: xr.Dataset | Mapping[str, Floats]) -> float:
     return math.nan
 
 
-# All six components of what supports carry in a run: stored of bearings, derived of ideal joints
+# Loads of supports in a run: stored for bearings, derived for ideal joints
 
 NEEDED = ("time", "input_speed", "mesh_force", "support_force")
 """Signals of a run that loads of ideal joints are derived from."""

@@ -504,9 +504,6 @@ class Assembly(ReprMixin):
         return f
 
 
-# Hash of all that the equations of a variant depend on
-
-
 def input_hash(assembly: Assembly, load_case: str | None = None) -> str:
     """SHA-256 of all that the equations of a variant depend on: gearbox file with its solids, choices, mesh stiffness.
 

@@ -26,8 +26,6 @@ from fe_ste.tools.arrays import Complexes, Floats, Integers
 from fe_ste.tools.compilation import kernel
 from fe_ste.tools.octets import SIZE, eight, put
 
-# Low-pass filter and decimation of signals while they are computed
-
 TAPS_PER_FACTOR = 31
 """Length of the anti-aliasing filter per decimation factor: 80 dB above 0.58, flat below 0.42 of the rate."""
 
@@ -215,8 +213,6 @@ class Decimator:
         self.pending_first += following
         return centre, results
 
-
-# Filters of stored signals: what is read off predicted states is put right while it is filtered
 
 HALF = 31
 """Rows on either side that the remedy takes at most."""

@@ -23,8 +23,6 @@ from exugear.transient.outcome import RunError
 if TYPE_CHECKING:
     from exugear.transient.exudyn_model.system import MeshRoute
 
-# How large a run is: its samples, steps, memory and disk, checked before anything is allocated or written
-
 SAMPLE_RATE = 20e3
 """Stored rate, Hz."""
 HIGHEST_BAND = 100e3
@@ -161,7 +159,7 @@ def _span(gearbox: Gearbox, case: LoadCase, duration: float | None) -> tuple[flo
     return case.duration, f"{gearbox.source}: load_cases.{case.name}.duration_s"
 
 
-# What a run is to do: its steps, and what it was run with, as the file keeps it
+# Steps and settings of a run
 
 EXPECTATIONS = ("stability_margin", "expected_error_at_band", "expected_error_of_resonances")
 """Attributes that say what a method and its step are expected to do."""

@@ -21,8 +21,6 @@ from exugear.transient.start import RunStart
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.threads import second_thread
 
-# The account of energy of a run: powers integrated, energies as they are
-
 INTEGRATED = [BALANCE_TERMS.index(term) for term in POWERS]
 """Columns of the account that are integrals of powers."""
 OBSERVED = [BALANCE_TERMS.index(term) for term in ENERGIES]
@@ -87,8 +85,6 @@ class EnergyAccount:
         self.powers, self.balance = powers[-1].copy(), lines[-1]
         return lines
 
-
-# What a run leaves behind: its states turned into signals, filtered, judged and written piece by piece
 
 FLUSH_INTERVAL = 0.25
 """Simulated time between writes to disk, s."""

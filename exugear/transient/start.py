@@ -41,8 +41,6 @@ from exugear.transient.plan import EXPECTATIONS, RunPlan
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.files import FileError, exclusive
 
-# The folder of a run: one process at a time, and nothing lost
-
 LOCK_NAME = "run.partial.lock"
 
 
@@ -100,9 +98,6 @@ def refuse_shorter(directory: Path, duration: float) -> str:
     if reached <= duration * (1.0 + 1e-9):
         return ""
     return f"{directory / PARTIAL_NAME}: has reached {reached:.4g} s; a duration of {duration:g} s ends before that"
-
-
-# Where a run starts from and what acts on it, anew or from the last piece of a run that was stopped
 
 
 @dataclass(frozen=True, eq=False)

@@ -280,8 +280,6 @@ def _contact_stress(
     return stresses
 
 
-# Stresses in meshing teeth at one position, from the reference analysis or under the superelement's pressures
-
 #: Points across a contact cell at which its force acts.
 _POINTS_ACROSS = 5
 

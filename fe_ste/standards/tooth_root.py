@@ -259,7 +259,7 @@ def _rack_radius(gear: Gear) -> float:
     return radius + float(reach**1.95) / (3.156 * 1.036**cutter.teeth)
 
 
-# What a tooth root withstands beside its material, by ISO 6336-3:2006 method B: Y_delta_rel_T, Y_R_rel_T and Y_X
+# Permissible tooth root stress, ISO 6336-3:2006 method B: Y_delta_rel_T, Y_R_rel_T and Y_X
 
 _TEST_NOTCH = 2.5
 """q_s of the test gears."""

@@ -197,7 +197,7 @@ def mark_not_converged(panel: Axes, pmc: Floats, height: Floats) -> None:
     panel.legend(loc="best")
 
 
-# One quantity of one table on the axes of the caller, for `MeshTable.plot`
+# One quantity of a table on given axes, for `MeshTable.plot`
 
 KINDS = {
     "ste": ("ste", "Static transmission error / µm", 1e6),

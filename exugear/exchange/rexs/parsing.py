@@ -390,8 +390,6 @@ def document_of(content: bytes) -> Document:
     raise RexsError("not a REXS file: neither XML nor JSON nor a zip archive of one of them")
 
 
-# Model of a document
-
 _FORBIDDEN = ("data_source", "referenced_component_id")
 
 

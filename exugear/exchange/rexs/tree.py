@@ -96,8 +96,6 @@ def plain(text: object, longest: int = LONGEST_TEXT) -> str:
     return f"{line[: longest - 1]}…"
 
 
-# Content of a REXS file: components with attributes, relations between them, load cases
-
 LARGEST_NUMBER = 1e40
 """Limit of numbers that represent physical quantities; files write 1e23 for rigid. Powers of it are still finite."""
 

@@ -17,8 +17,6 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from fe_ste.tools.display import html_table
 
-# Kinds of quantities in a gearbox file, with possible and usual values
-
 
 @dataclass(frozen=True)
 class Range:
@@ -224,8 +222,6 @@ def _plain(kind: Any) -> Any:
         kind = get_args(kind)[0]
     return get_origin(kind) or kind
 
-
-# Common definitions of all sections: names, texts, tables of named entries; unknown keys are refused
 
 GROUND = "ground"
 """Name of the stationary environment, used in place of a body."""

@@ -267,8 +267,6 @@ class RatingSection(Section):
         return self
 
 
-# Section on the oil of a gearbox, for the rating of flanks and bearings
-
 Cleanliness = Literal["extreme", "high", "normal", "slight", "typical", "severe", "very_severe"]
 
 

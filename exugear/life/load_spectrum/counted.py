@@ -132,8 +132,6 @@ def _torque_on(gearbox: Gearbox, body: str) -> dict[str, float]:
     return {body: 1.0}
 
 
-# Counted loads of a gearbox: by source, by bin, and as load cycles of rotating parts
-
 EXPONENTS = (3.0, 10.0 / 3.0, 6.61, 8.74)
 """Slopes of S-N curves: steel structures, roller bearings, contact and bending of gears, all over torque."""
 

@@ -23,8 +23,6 @@ from exugear.life.load_spectrum.counting import Rainflow, equivalent_range
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.display import ReprMixin
 
-# Reduction of load samples during reading: any number of files yields some ten thousand points
-
 HUB_LOADS = 5
 """Rotor loads in addition to torque: forces along x, y, z, moments about x and y."""
 COMPONENTS = ("torque", "force_x", "force_y", "force_z", "moment_x", "moment_y")

@@ -131,8 +131,6 @@ def _share(model: Model, case: RexsLoadCase, where: str) -> float:
     raise RexsError(f"{where}: no operating_time_fraction of the gear_unit")
 
 
-# Load sources of a gearbox file: files found, read and weighted by hours of the life, with the hash of each
-
 HOURS_PER_YEAR = 8766.0
 HUB_CELLS = 8
 """Number of cells of each rotor load into which torque bins are split."""

@@ -112,8 +112,6 @@ def nearest_mode(modes: xr.Dataset, frequency: float, least_share: float = 0.0) 
     return report_mode(modes, int(allowed[np.argmin(np.abs(frequencies[allowed] - frequency))]))
 
 
-# Spectra of stored run-ups: their waterfall, and their resonances with the assigned eigenmodes
-
 LEAST_SHARE = 1e-5
 """Minimum participation of a mode that is assigned to a resonance of the overall transmission error."""
 SHIFT = 0.01

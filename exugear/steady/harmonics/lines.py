@@ -316,8 +316,6 @@ def _with_slow(units: Integers, slow: int) -> Integers:
     return found
 
 
-# A rank-1 lattice on the torus of all bases' angles: few samples on which lines do not alias
-
 GROWTH = 1.15
 """Factor from one number of samples that is tried to the next."""
 TRIES = 400
@@ -430,9 +428,6 @@ def _smooth(least: int) -> int:
         if rest == 1:
             return number
         number += 2
-
-
-# Products of signals with functions of the bases' angles that couple them: each harmonic carries lines to others
 
 
 def fourier_coefficients(samples: Floats, harmonics: int) -> Complexes:

@@ -107,8 +107,6 @@ def wave_shapes(planets: PlanetSet | None, speed: float, turned: Floats | None) 
     return np.stack([np.ones_like(theta), np.cos(theta), np.sin(theta)], axis=1)
 
 
-# What mesh laws read of the motion and what they push along: rows by the frame's coordinates, as waves
-
 DEFLECTION, MISALIGNMENT, POSITION = 0, 1, -1
 """Indices of the inputs of a model along a row: the first, the second where its load shuttles, the last."""
 FRONT, BACK, CENTRE, TILT, BACK_TILT = range(5)
@@ -185,8 +183,6 @@ def _table_rows(meshes: MeshArrays) -> tuple[list[Floats], list[Floats]]:
     # The other flank closes when the loaded one opens by the backlash.
     return rows, [front, -front - table.backlash, nominal[NOMINAL_DISTANCE], tilt, tilt]
 
-
-# How functions of the mesh cycle couple the waves of meshes: one matrix for each harmonic of the angles that turn
 
 SAMPLED = 4
 """Samples of a carrier's turn over the highest multiple of it that shapes have with each other."""

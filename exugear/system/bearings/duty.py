@@ -43,8 +43,6 @@ from exugear.system.bearings.stiffness import LEAST_LOAD, holding_force, holds_o
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin
 
-# The state that a bearing works in: what it carries, how its rings stand, and how stiff its rows are there
-
 CAGE_POSITIONS = 4
 """Positions of the cage within one pitch over which the stiffness is averaged: a linear bearing knows no cage."""
 
@@ -137,8 +135,6 @@ def operating_point(
         bearing, rows, displacement, load, stiffness, is_unloaded, first_roller_angle, load_stands_still
     )
 
-
-# What bearings bear: load, stiffness, misalignment, contact pressure and life of each at its operating point
 
 INSIDE = ("element_diameter_mm", "element_count", "element_length_mm")
 """Estimates that ratings rest on."""

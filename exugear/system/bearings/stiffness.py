@@ -120,8 +120,6 @@ def proportional_damping(stiffness: Floats, time_constant: float) -> Floats:
     return time_constant * stiffness
 
 
-# Laws of supports: stiffness and damping as matrices, or rows of rolling elements with a law of their own
-
 NOMINAL_LOAD = 0.1
 """Load over the basic dynamic rating at which a bearing's stiffness is taken where its load is not known yet."""
 LEAST_LOAD = 0.01
@@ -347,7 +345,7 @@ def holding_force(rows: Sequence[RollingRow], radial: float, direction: float = 
     return radial * math.cos(direction), radial * math.sin(direction), axial
 
 
-# Planets made equal: bearings of a planet set get the mean of their laws, each seen along its own radius
+# Equal planets: bearings of a planet set get the mean of their laws, each seen along its own radius
 
 FEWEST = 3
 """Planets that a set needs: fewer do not average out what their turning does to the others."""
@@ -445,7 +443,7 @@ def _turn(angle: float) -> Floats:
     return turn
 
 
-# What holds the bodies of a variant: which supports are at work
+# Active supports of a variant
 
 
 def unsupported(gearbox: Gearbox, variant: str) -> str:

@@ -52,7 +52,7 @@ from exugear.system.bodies.turned_section import Shaft, turned_hexahedra
 from exugear.system.bodies.turned_shaft import ShaftModel, load_or_reduce_shaft, reduce_shaft
 from fe_ste.geometry.gears import Material
 
-# Sections of the gearbox file as a reduction takes them: materials, blanks, frames, widths of seats
+# Input of a reduction from the gearbox file: materials, blanks, frames, widths of seats
 
 
 def material_of(section: MaterialSection) -> Material:
@@ -459,9 +459,6 @@ def check_solids(gearbox: Gearbox, folder: Path) -> None:
         file: SolidFile = model.mesh
         if file.is_script and not file.scripts and not reduction_file(model, folder).is_file():
             raise gearbox.error(f"{key}.file = {file.path.name!r}: {UNPERMITTED}")
-
-
-# The elastic bodies of a gearbox: all that are elastic, reduced, with the rigid inertia of an inertia set
 
 
 def reduced_bodies(

@@ -319,9 +319,6 @@ def _surface(model: SolidModel, reduced: ReducedSolid) -> BodySurface:
     )
 
 
-# Flexible bodies in a floating frame: normal modes, and integrals over their mass
-
-
 def floating_body(model: SolidModel, matrices: ReducedSolid | None = None) -> FloatingBody:
     """Modes of a solid in its own frame, and its mass integrals; from its reduced matrices if they are available."""
     reduced = matrices or reduce_matrices(model)

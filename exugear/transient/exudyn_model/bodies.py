@@ -36,8 +36,6 @@ from exugear.system.system import Assembly
 from exugear.transient.exudyn_model.library import elements, exudyn, items
 from fe_ste.tools.arrays import Floats
 
-# Exudyn's object of a floating frame of reference, made from the integrals of a body's modes
-
 Rotation = Literal["euler_parameters", "tait_bryan"]
 
 
@@ -361,9 +359,6 @@ class Parts:
         node = self.nodes[key if key in self.nodes else body]
         coordinate = SPIN_COORDINATE if has_six else 0
         return self.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=coordinate))
-
-
-# Bodies of an assembly in an Exudyn system: rigid ones, those with their spin alone, and elastic ones
 
 
 def add_bodies(parts: Parts, q: Floats, v: Floats) -> None:

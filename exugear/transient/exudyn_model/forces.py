@@ -25,8 +25,6 @@ from exugear.transient.exudyn_model.bodies import Parts
 from exugear.transient.exudyn_model.library import exudyn, items
 from fe_ste.tools.arrays import Floats
 
-# What joins bodies in an Exudyn system: bearings and mounts, torsional couplings, ideal joints
-
 FREE_SPIN = [1, 1, 1, 1, 1, 0]
 """Axes that an ideal joint holds: all but the spin."""
 
@@ -124,7 +122,7 @@ def add_joint(parts: Parts, joint: Joint) -> None:
     )
 
 
-# What acts on a gearbox from outside in an Exudyn system: torques, and the drive at prescribed speed
+# External loads: torques, and the drive at prescribed speed
 
 
 def add_loads(parts: Parts, loads: LoadTable) -> None:
@@ -158,9 +156,6 @@ def add_loads(parts: Parts, loads: LoadTable) -> None:
 
 def _load_function(loads: LoadTable, body: str) -> Callable[[Any, float, float], float]:
     return lambda mbs, t, load: loads.torque(body, t)
-
-
-# Gear meshes in an Exudyn system, by one element for all of them or by loads on each gear
 
 
 def add_mesh_element(parts: Parts, meshes: MeshArrays) -> None:
@@ -263,9 +258,6 @@ class _MeshVectors:
         transposed = np.array([[1.0, 0.0, 0.0], [0.0, ca, sa], [sb, -sa * cb, ca * cb]])
         values: list[float] = np.linalg.solve(transposed, f[3:]).tolist()
         return values
-
-
-# The variant `rigid` in an Exudyn system: minimal coordinates, masses, couplings, meshes and loads in one object
 
 
 def add_minimal_system(

@@ -44,8 +44,6 @@ from fe_ste.tools.files import FileError
 from fe_ste.transmission_error.contact_stress import face_load_factor, largest_contact_stress, load_along_face
 from fe_ste.transmission_error.table import MeshTable, TableError
 
-# Results in a folder that belong to a gearbox; files computed from other input are skipped and reported
-
 Result = TypeVar("Result")
 Member = TypeVar("Member")
 _UNFIT = (GearboxFileError, MeshError, VariantError, BearingError, BalanceError, FileError, KeyError, ValueError)
@@ -484,9 +482,6 @@ def put_runs(results: Results, runs: Mapping[Choice, xr.Dataset]) -> None:
             for key, value in (("mesh_force_maximum", force.max()), ("mesh_force_mean", force.mean())):
                 if stage is not None and math.isfinite(float(value)):
                     results.put_named(stage, f"{OWN}{key}_{ending}", "N", float(value), case)
-
-
-# Export of results into the REXS file from which a gearbox was imported
 
 
 @dataclass(frozen=True)

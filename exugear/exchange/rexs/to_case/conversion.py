@@ -71,8 +71,6 @@ from exugear.gearbox.reading import GearboxFileError
 from exugear.system.gearbox_checks import check_parts
 from fe_ste.tools.display import ReprMixin
 
-# Bodies of a REXS file as tables of the gearbox file: position, inertia, and the shape of shafts
-
 INERTIAS = "geometry"
 """Name of the inertia set."""
 
@@ -227,8 +225,6 @@ def gear_places(teeth: Teeth, bodies: RigidGroups) -> dict[str, float]:
             found.setdefault(body.carrier, found[body.name])
     return {name: z for name, z in found.items() if math.isfinite(z)}
 
-
-# Conversion of a REXS file to a gearbox file; all errors are reported together, and assumptions are marked
 
 SPEED_TOLERANCE = 1e-3
 """Largest relative difference between a speed in the file and the kinematic speed."""

@@ -375,7 +375,7 @@ def _ribs(section: CatalogueSection, row: RollerRow | BallRow) -> tuple[RollerRo
     return tuple(rib_row(row, sense, length) for sense in senses)
 
 
-# Load ratings that makers print for a designation, and how far estimates may lie above printed ones
+# Catalogue load ratings, and the largest ratio of estimates to them
 
 WITHIN = 0.005
 """Part by which dimensions may differ from those of the designation."""

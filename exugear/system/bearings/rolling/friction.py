@@ -199,9 +199,6 @@ def _moment(section: CatalogueSection, k: Constants, at: _Operation, viscosity: 
     return float(1e-3 * (heating * starvation * rolling * product**0.6 + sliding * coefficient))
 
 
-# Variables G_rr and G_sl of each type
-
-
 def _deep_groove(k: Constants, at: _Operation) -> tuple[float, float]:
     if at.axial == 0.0:
         return k["R_1"] * at.mean**1.96 * at.radial**0.54, k["S_1"] * at.mean**-0.26 * at.radial ** (5.0 / 3.0)

@@ -202,8 +202,6 @@ def _ring_capacities(row: RollingRow, row_rating: float, bearing_type: BearingTy
     return common / 0.378 * (1.0 + weaker) ** power, common / 0.364 * (1.0 + 1.0 / weaker) ** power
 
 
-# Modified rating life of rolling bearings by ISO 281:2007: viscosity, cleanliness and fatigue limit
-
 CONTAMINATION: dict[Cleanliness, tuple[float, float]] = {
     "extreme": (1.0, 1.0),
     "high": (0.6, 0.8),

@@ -339,8 +339,6 @@ def ball_tangent(balls: BallArrays, displacement: Floats) -> Floats:
     return symmetric
 
 
-# Potentials of rolling bearings for the compiled law: rows to the arrays of `exugear.system.kernels.rolling`
-
 SLICES = 240
 """Slices of a roller: their sum is within 1e-4 of that of infinitely many where 30 are 1 % soft against tilting."""
 STEPS, MORE_STEPS = (32, 24), (48, 32)
