@@ -335,9 +335,7 @@ def _relief_gap(gear: Gear, key: str, relief: Relief, roll_length: Floats, end: 
 def _slope(amount: float, position: Floats) -> Floats:
     """Linear gap over positions 0 to 1 that is zero at one end: at 0, or at 1 for a negative amount."""
     within = np.clip(position, 0.0, 1.0)
-    if amount >= 0.0:
-        return amount * within
-    return -amount * (1.0 - within)
+    return amount * within if amount >= 0.0 else -amount * (1.0 - within)
 
 
 def radius_at_roll_length_from_tip(gear: Gear, roll_length: float) -> float:

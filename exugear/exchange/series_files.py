@@ -135,9 +135,7 @@ def fortran_number(word: str) -> float:
     (1.2345e-101, -450.0, 7.0)
     """
     found = FORTRAN_NUMBER.fullmatch(word)
-    if found is not None:
-        return float(f"{found[1]}e{found[2]}")
-    return float(word)
+    return float(f"{found[1]}e{found[2]}") if found is not None else float(word)
 
 
 @dataclass(frozen=True)

@@ -44,9 +44,7 @@ def inertia_sets(origin: Origin) -> tuple[str, ...]:
     """
     moving = [section for section in origin.enabled.values() if not section.fixed]
     named = next((section.inertia for section in moving if section.inertia), None)
-    if moving:
-        return tuple(named or (origin.case.default_inertias,))
-    return ()
+    return tuple(named or (origin.case.default_inertias,)) if moving else ()
 
 
 def bodies(origin: Origin, inertias: str) -> tuple[Body, ...]:

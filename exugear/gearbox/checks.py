@@ -139,21 +139,16 @@ def errors_of_output_gear(
         listed = known_names("gears", gears, f"gears.{overall.output_gear}")
         yield f"overall.output_gear = {overall.output_gear!r}: no such gear; {listed}"
         return
-    turning = _coupled(couplings, overall.output)
+    # Names of the body and of all bodies that couplings connect to it; they rotate at one speed.
+    turning = {overall.output}
+    for _ in couplings:
+        turning |= {name for c in couplings if {c.first, c.second} & turning for name in (c.first, c.second)}
     known = [gear for body in named_bodies.values() if body.name in turning for gear in body.wheels]
     if known and overall.output_gear not in known:
         yield (
             f"overall.output_gear = {overall.output_gear!r}: does not rotate with {overall.output}; gears that do are "
             f"{', '.join(known)}"
         )
-
-
-def _coupled(couplings: Sequence[Coupling], body: str) -> set[str]:
-    """Names of the body and of all bodies that couplings connect to it; they rotate at one speed."""
-    reached = {body}
-    for _ in couplings:
-        reached |= {name for c in couplings if {c.first, c.second} & reached for name in (c.first, c.second)}
-    return reached
 
 
 def errors_of_repetition(

@@ -332,11 +332,11 @@ def _relief(
     amount = si(given, f"{kind}_relief_um")
     if amount == 0.0:
         return None
-    length = optional_si(given, f"{kind}_relief_length_mm")
-    if length is not None:
-        radius = from_end(gear, length)
+    start_roll = optional_si(given, f"{kind}_relief_start_roll_deg")
+    if start_roll is None:
+        radius = from_end(gear, si(given, f"{kind}_relief_length_mm"))
     else:
-        radius = gear.base_radius * math.hypot(1.0, si(given, f"{kind}_relief_start_roll_deg"))
+        radius = gear.base_radius * math.hypot(1.0, start_roll)
     return Relief(amount, radius, ReliefShape(getattr(given, f"{kind}_relief_shape")))
 
 

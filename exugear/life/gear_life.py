@@ -46,7 +46,6 @@ from fe_ste.standards.pitting import (
     velocity_factor,
 )
 from fe_ste.standards.tooth_root import (
-    RootStressFactors,
     notch_factor,
     root_face_load_factor,
     root_stress_factors,
@@ -316,12 +315,9 @@ class _RatedTooth:
             stress.at(stress.compression, 1.0, torque, tilt)[..., member],
         )
 
-    def _root_factors(self) -> RootStressFactors:
-        return root_stress_factors(self.pair, self.tooth.member, edition=self.rating.edition)
-
     def _nominal_root(self, force: float) -> float:
         area = self.pair.face_width * self.pair.pinion.normal_module
-        return force / area * self._root_factors().product
+        return force / area * root_stress_factors(self.pair, self.tooth.member, edition=self.rating.edition).product
 
     def _rated(
         self, hertz: Floats, root: Floats, cycles: Floats, speed: Floats, worst_hertz: float, worst_root: float

@@ -193,9 +193,7 @@ def summary(dataset: xr.Dataset) -> dict[str, Any]:
 
 
 def _number(value: float) -> float | str:
-    if math.isinf(value):
-        return INFINITE
-    return value
+    return INFINITE if math.isinf(value) else value
 
 
 def _entries(dataset: xr.Dataset, name: str, numbers: Sequence[str]) -> Iterator[Mapping[str, Any]]:

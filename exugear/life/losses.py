@@ -226,7 +226,12 @@ def _at_temperature(
     known = {duty.name for duty in duties}
     meshes = _mesh_losses(gearbox, tables, speeds, kinematic * density)
     bearings = _bearing_losses(gearbox, duties, speeds, kinematic)
-    seals = _seal_losses(gearbox, speeds)
+    found = []
+    for name, seal in gearbox.case.seals.items():
+        relative = abs(speeds.get(seal.body, 0.0) - speeds.get(seal.on, 0.0))
+        loss = SEAL_LOSS * seal.diameter_mm**2 * relative / RPM
+        found.append(SealLoss(name, si(seal, "diameter_mm"), relative, loss))
+    seals = tuple(found)
     shares = {mesh.family: mesh.friction * mesh.loss_factor for mesh in meshes}
     flow = power_flow(
         gearbox.train,
@@ -363,15 +368,6 @@ def _bearing_losses(
         largest = max(map(_equivalent_load, members))
         ratio = largest / members[0].ratings.dynamic
         found.append(BearingLoss(family, len(members), largest, ratio, relative, series, loss, (low, high)))
-    return tuple(found)
-
-
-def _seal_losses(gearbox: Gearbox, speeds: Mapping[str, float]) -> tuple[SealLoss, ...]:
-    found = []
-    for name, seal in gearbox.case.seals.items():
-        relative = abs(speeds.get(seal.body, 0.0) - speeds.get(seal.on, 0.0))
-        loss = SEAL_LOSS * seal.diameter_mm**2 * relative / RPM
-        found.append(SealLoss(name, si(seal, "diameter_mm"), relative, loss))
     return tuple(found)
 
 

@@ -460,9 +460,7 @@ def life_requests(assembly: Assembly, counted: CountedLoads, folder: Path) -> li
     """
     grid = LAWS[assembly.mesh_model].needs_axes
     requests = requested_tables(assembly.gearbox, folder, grid=grid)
-    if grid:
-        return requests
-    return stress_requests(assembly, requests, counted, folder)
+    return requests if grid else stress_requests(assembly, requests, counted, folder)
 
 
 def stress_requests(

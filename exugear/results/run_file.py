@@ -506,9 +506,7 @@ def _load_pieces(folder: Path, wanted: list[str] | None) -> xr.Dataset:
             values = np.concatenate(parts[name]) if growing else parts[name][-1]
             data[name] = (variable.dimensions, values, variable.attributes)
     _LAYOUT.check(data, folder)
-    if wanted is None:
-        return data
-    return data[wanted]
+    return data if wanted is None else data[wanted]
 
 
 def invalidity_of(attributes: Mapping[str, Any]) -> str:

@@ -143,9 +143,7 @@ def _clarity(one: Found, other: Found, narrowest: float) -> float:
     share = 2.0 * np.sqrt(cross) / (1.0 / apart[0] + 1.0 / apart[1]) / (apart[0] + apart[1])
     hidden = share[share > narrowest].max(initial=0.0)
     clear = float(values.min(initial=1.0))
-    if hidden:
-        return min(clear, CLEAR * (1.0 - min(1.0, float(hidden))))
-    return clear
+    return min(clear, CLEAR * (1.0 - min(1.0, float(hidden)))) if hidden else clear
 
 
 def _joined(speeds: Floats, found: list[Found]) -> ModeTracks:
@@ -263,9 +261,7 @@ class ModeNamer:
             return ""
         most = int(np.argmax(own))
         kind = KINDS[most] if own[most] >= OF_KIND * own.sum() else MIXED
-        if len(sets) == 1:
-            return kind
-        return f"{kind} of {planets.carrier}"
+        return kind if len(sets) == 1 else f"{kind} of {planets.carrier}"
 
     def _motion_shares(self, planets: PlanetSet, shape: Complexes, kinetic: Floats) -> tuple[float, Floats]:
         """Share of the planets of a set, and shares (3,) of the set by type of motion."""

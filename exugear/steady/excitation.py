@@ -247,9 +247,7 @@ class HarmonicBalanceModel:
     @property
     def bearing_names(self) -> tuple[str, ...]:
         """Bearings whose laws are evaluated in time, planets' by their family, in the order of the laws."""
-        if self.bearings is None:
-            return ()
-        return self.bearings.names
+        return () if self.bearings is None else self.bearings.names
 
     @cached_property
     def bearing_signals(self) -> Integers:
@@ -590,6 +588,4 @@ def _lines_within(waves: MeshWaves, reach: HarmonicTruncation) -> LineSet:
     """Orders up to a limit, with the sidebands caused by planets that mesh out of phase."""
     lines = line_set(waves.base_orders.tolist(), reach.harmonics, reach.combinations)
     modulators = [own for _, own in waves.carriers]
-    if waves.passing:
-        return beside(lines, modulators, 0)
-    return modulated(lines, modulators)
+    return beside(lines, modulators, 0) if waves.passing else modulated(lines, modulators)

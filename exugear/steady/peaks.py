@@ -148,13 +148,14 @@ def sidebands(data: xr.Dataset, peak: Peak, signal: str = "overall_dte", least: 
         apart = multiples - index[own]
         if line == own or multiples[carrying] != index[own][carrying] or values[line] < least * values[own]:
             continue
+        words = line_name(tuple(int(n) for n in apart), bases)
         found.append(
             Sideband(
                 line=line_name(tuple(int(n) for n in index[line]), bases),
                 frequency=float(data["order"][line]) * abs(peak.speed) / (2.0 * np.pi),
                 amplitude=float(values[line]),
                 share=float(values[line] / values[own]),
-                cause=_signed(line_name(tuple(int(n) for n in apart), bases)),
+                cause=words if words.startswith("- ") else f"+ {words}",
             )
         )
     return tuple(sorted(found, key=lambda band: -band.amplitude))
@@ -207,12 +208,6 @@ def _place(data: xr.Dataset, peak: Peak) -> tuple[int, int]:
     """Point and line of a peak."""
     orders: Floats = data["order"].to_numpy()
     return int(np.argmin(np.abs(data["speed"].to_numpy() - peak.speed))), int(np.argmin(np.abs(orders - peak.order)))
-
-
-def _signed(words: str) -> str:
-    if words.startswith("- "):
-        return words
-    return f"+ {words}"
 
 
 @dataclass(frozen=True)

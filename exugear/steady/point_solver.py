@@ -174,9 +174,7 @@ class PointSolver:
     @property
     def continuation_model(self) -> HarmonicBalanceModel:
         """HarmonicBalanceModel with the orders of a continuation: twice the harmonics with contact loss."""
-        if self.model.is_nonlinear:
-            return self.model.finer
-        return self.model
+        return self.model.finer if self.model.is_nonlinear else self.model
 
     def readings(self, speed: float) -> Complexes:
         """Return the inputs of the mesh models (n, m, r) at an input speed (rad/s), in the orders of a continuation."""

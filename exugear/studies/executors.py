@@ -121,9 +121,7 @@ def number_of(value: Any) -> float:
     [2.0, inf, -inf, nan]
     """
     if isinstance(value, str):
-        if value.startswith("-"):
-            return -math.inf
-        return math.inf
+        return -math.inf if value.startswith("-") else math.inf
     if value is None:
         return math.nan
     return float(value)

@@ -119,9 +119,7 @@ def _finite(values: Floats) -> Floats:
 
 def _label(values: xr.DataArray) -> str:
     units = str(values.attrs.get("units", ""))
-    if units not in ("", "1"):
-        return f"{values.name} / {units}"
-    return str(values.name)
+    return f"{values.name} / {units}" if units not in ("", "1") else str(values.name)
 
 
 def _draw_curves(axes: Axes, values: xr.DataArray, along: str, rows: Floats, labels: list[str]) -> None:

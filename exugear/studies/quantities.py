@@ -306,9 +306,7 @@ def loudest_peak(results: PointResults, *, signal: str = OVERALL) -> float:
 def loudest_speed(results: PointResults, *, signal: str = OVERALL) -> float:
     """Input speed at which an order of a signal is highest."""
     found = peaks(results.steady, signal)
-    if found:
-        return float(abs(found[0].speed))
-    return float("nan")
+    return float(abs(found[0].speed)) if found else float("nan")
 
 
 def harmonics(
@@ -512,17 +510,14 @@ def _flank_values(results: PointResults, key: str) -> dict[str, float]:
 def _bearing_values(results: PointResults, key: str, by: str, worst: Worst) -> dict[str, float]:
     """Return values by bearing, for one kind of life or the worst of all known ones."""
     data = results.life
-    names = [_name_of(kind, key) for kind in (LIVES.values() if by == MINIMUM else [LIVES[by]])]
+    names = [
+        ("bearing_damage" if (kind, key) == ("basic", "damage") else f"bearing_{kind}_{key}")
+        for kind in (LIVES.values() if by == MINIMUM else [LIVES[by]])
+    ]
     columns = zip(*(data[name].to_numpy().tolist() for name in names), strict=True)
     known = [[value for value in column if not math.isnan(value)] for column in columns]
     found = [worst(values) if values else math.nan for values in known]
     return dict(zip(map(str, data["bearing"].to_numpy()), found, strict=True))
-
-
-def _name_of(kind: str, key: str) -> str:
-    if (kind, key) == ("basic", "damage"):
-        return "bearing_damage"
-    return f"bearing_{kind}_{key}"
 
 
 def _worst(values: Mapping[str, float], part: str, worst: Worst) -> float:
@@ -536,9 +531,7 @@ def _worst(values: Mapping[str, float], part: str, worst: Worst) -> float:
 
 def _number_of(holder: str) -> float:
     number = holder.rpartition("_")[2]
-    if number.isdecimal():
-        return float(number)
-    return math.nan
+    return float(number) if number.isdecimal() else math.nan
 
 
 # Table of all outputs for study files; a study in Python may add its own

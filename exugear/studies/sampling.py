@@ -431,9 +431,7 @@ def units_of(parameter: ParameterSection) -> str:
     if parameter.acts == "scales":
         return "1"
     units = {unit_of(path.rpartition(".")[2]) for path in parameter.targets}
-    if len(units) == 1:
-        return units.pop()
-    return ""
+    return units.pop() if len(units) == 1 else ""
 
 
 def _draws(study: StudyFile, drawn: Mapping[str, ParameterSection], gearbox: Gearbox) -> _Levels:

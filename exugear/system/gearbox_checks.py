@@ -204,9 +204,7 @@ def usual_variant(gearbox: Gearbox) -> Variant:
     >>> usual_variant(Gearbox.from_toml("cases/grc750/gearbox.toml"))
     'bushing'
     """
-    if lacking(gearbox, Variant.bushing):
-        return Variant.rigid
-    return Variant.bushing
+    return Variant.rigid if lacking(gearbox, Variant.bushing) else Variant.bushing
 
 
 def _misfits(gearbox: Gearbox, variant: Variant) -> str:

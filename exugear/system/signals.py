@@ -451,9 +451,7 @@ def energy_residual(data: xr.Dataset | Mapping[str, Floats]) -> float:
     kinetic = change["kinetic_energy"]
     last = float(data["kinetic_energy"][-1])
     scale = kinetic if abs(kinetic) > STEADY_CHANGE * last else last
-    if scale:
-        return (change["work_of_loads"] - explained) / scale
-    return math.nan
+    return (change["work_of_loads"] - explained) / scale if scale else math.nan
 
 
 # Loads of supports in a run: stored for bearings, derived for ideal joints

@@ -365,9 +365,7 @@ class Assembly(ReprMixin):
         if not self.travelling.first.size:
             return q, v
         x, u = follow(np.atleast_2d(q), np.atleast_2d(v), self.travelling)
-        if q.ndim > 1:
-            return (x, u)
-        return (x[0], u[0])
+        return (x, u) if q.ndim > 1 else (x[0], u[0])
 
     def mesh_forces(self, q: Floats, v: Floats, meshes: MeshArrays) -> Floats:
         """Generalized forces of meshes, shape (size,), N and N m."""

@@ -300,6 +300,4 @@ def _solver(asked: str | None, assembly: Assembly, mesh_route: str) -> str:
     reason = unsupported_reason(assembly) if mesh_route == "element" else "user-function loads exist in Exudyn only"
     if asked == "compiled" and reason:
         raise RunError(f"the compiled solver cannot run this: {reason}; use --solver exudyn")
-    if reason:
-        return "exudyn"
-    return asked or "compiled"
+    return "exudyn" if reason else asked or "compiled"

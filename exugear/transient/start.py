@@ -134,7 +134,10 @@ def prepare_start(plan: RunPlan, resume: bool) -> RunStart:
         pieces = _pieces_to_resume(plan, layout)
         pieces.note("duration", plan.duration)
         state = pieces.last_checkpoint()
-        _take_over_judgement(plan, judge, state)
+        judge.figures = state.judgement
+        if judge.stop:
+            reasons = judge.reasons(state.mesh_times, state.step * plan.step)
+            raise RunError(f"{plan.partial_path}: aborted: {'; '.join(reasons)}; run it again without --resume")
     else:
         state = _first_state(assembly, case, series, layout, judge)
         (plan.directory / EARLIER_PARTIAL_NAME).unlink(missing_ok=True)
@@ -162,13 +165,6 @@ def _pieces_to_resume(plan: RunPlan, layout: SignalLayout) -> RunPieces:
                 f"{plan.partial_path}: was run with {key} = {kept}, not {value}; run it again without --resume"
             )
     return pieces
-
-
-def _take_over_judgement(plan: RunPlan, judge: ValidityMonitor, state: RunCheckpoint) -> None:
-    judge.figures = state.judgement
-    if judge.stop:
-        reasons = judge.reasons(state.mesh_times, state.step * plan.step)
-        raise RunError(f"{plan.partial_path}: aborted: {'; '.join(reasons)}; run it again without --resume")
 
 
 def _first_state(

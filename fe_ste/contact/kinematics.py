@@ -347,9 +347,7 @@ def _form_roll(flank: FlankCompliance) -> float:
 
 def _above(flank: FlankCompliance, roll: Floats) -> Floats:
     """Roll angles by which points of a gear lie on the flank side of the form diameter."""
-    if flank.gear.internal:
-        return _form_roll(flank) - roll
-    return roll - _form_roll(flank)
+    return _form_roll(flank) - roll if flank.gear.internal else roll - _form_roll(flank)
 
 
 def _parts_beyond(flanks: Flanks, cells: Cells) -> Floats:

@@ -392,9 +392,7 @@ def face_load_factor(line_load: float, stiffness: float, misalignment: float) ->
     (1.5, 4.0)
     """
     wedge = stiffness * misalignment / (2.0 * line_load)
-    if wedge <= 1.0:
-        return 1.0 + wedge
-    return 2.0 * math.sqrt(wedge)
+    return 1.0 + wedge if wedge <= 1.0 else 2.0 * math.sqrt(wedge)
 
 
 def transverse_load_factors(

@@ -145,9 +145,7 @@ def helix_factor(helix_angle: float, overlap: float, edition: Edition = "ISO 633
     """
     angle = min(abs(helix_angle), _LARGEST_HELIX)
     factor = 1.0 - min(overlap, 1.0) * angle / math.radians(120.0)
-    if edition == "ISO 6336:2006":
-        return factor
-    return float(factor / math.cos(angle) ** 3)
+    return factor if edition == "ISO 6336:2006" else float(factor / math.cos(angle) ** 3)
 
 
 def rim_factor(gear: Gear) -> float:

@@ -314,6 +314,4 @@ def _order_along_way(share: Floats) -> list[int]:
     ascending = float(np.abs(last[:-1] - first[1:]).sum())
     descending = float(np.abs(last[1:] - first[:-1]).sum())
     rows = list(range(share.shape[0]))
-    if ascending <= descending:
-        return rows
-    return rows[::-1]
+    return rows if ascending <= descending else rows[::-1]

@@ -93,9 +93,7 @@ def with_additions(path: str | Path, additions: Iterable[Addition]) -> bytes:
     with _errors_naming(path):
         member, unpacked = _member(content)
         new = put_additions(unpacked, placed)
-    if _is_archive(content):
-        return _repacked(content, member, new)
-    return new
+    return _repacked(content, member, new) if _is_archive(content) else new
 
 
 def rounded(value: AdditionValue) -> AdditionValue:

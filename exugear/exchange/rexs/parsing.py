@@ -320,9 +320,7 @@ class _Json:
 
 def _whole_number(digits: str) -> int | float:
     """Whole number; to save time, one with more digits than any id is a float, which may be infinite."""
-    if len(digits) < LONGEST_WHOLE:
-        return int(digits)
-    return float(digits)
+    return int(digits) if len(digits) < LONGEST_WHOLE else float(digits)
 
 
 def _no_number(text: str) -> float:

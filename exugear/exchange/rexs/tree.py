@@ -91,9 +91,7 @@ def plain(text: object, longest: int = LONGEST_TEXT) -> str:
     """
     words = "".join(sign if sign.isprintable() else " " for sign in str(text)[: 4 * longest]).split()
     line = " ".join(words).encode("utf-8", errors="replace").decode("utf-8")
-    if len(line) <= longest:
-        return line
-    return f"{line[: longest - 1]}…"
+    return line if len(line) <= longest else f"{line[: longest - 1]}…"
 
 
 LARGEST_NUMBER = 1e40

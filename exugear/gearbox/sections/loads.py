@@ -243,9 +243,7 @@ class RatingSection(Section):
     @field_validator("edition", mode="before")
     @classmethod
     def _edition_of_year(cls, value: Any) -> Any:
-        if str(value) in ("2006", "2019"):
-            return f"ISO 6336:{value}"
-        return value
+        return f"ISO 6336:{value}" if str(value) in ("2006", "2019") else value
 
     @model_validator(mode="after")
     def _edition(self) -> RatingSection:

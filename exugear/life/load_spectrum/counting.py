@@ -43,9 +43,7 @@ class DurationDistribution(ReprMixin):
 
     def torques(self, value: str) -> Floats:
         """Return the representative torque of each bin: its ``mean``, or its ``upper`` edge, which is conservative."""
-        if value == "upper":
-            return self.upper
-        return self.torque
+        return self.upper if value == "upper" else self.torque
 
 
 def load_duration(

@@ -177,9 +177,7 @@ class SamplePool:
     def samples(self) -> Samples:
         """Return all samples, reduced if there are many."""
         found = together(self._parts)
-        if len(found) > MOST_POINTS:
-            return condensed(found, self.extreme)
-        return found
+        return condensed(found, self.extreme) if len(found) > MOST_POINTS else found
 
     def equivalent_ranges(self) -> dict[tuple[str, float], float]:
         """Return the damage-equivalent range at one cycle per second of all files together, by component and slope."""

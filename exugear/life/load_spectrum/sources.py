@@ -192,9 +192,7 @@ class LoadSource(ReprMixin):
     @property
     def hub_loads(self) -> Floats:
         """Rotor loads (samples, 5), with zeros if there are none."""
-        if self.hub.shape[1]:
-            return self.hub
-        return np.zeros((len(self.torque), HUB_LOADS))
+        return self.hub if self.hub.shape[1] else np.zeros((len(self.torque), HUB_LOADS))
 
 
 LEAST_SHARE_BACKWARDS = 0.05

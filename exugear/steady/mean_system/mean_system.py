@@ -340,9 +340,7 @@ def _stiffness(frame: RotatingFrame, psi: float, speed: float, u: Floats) -> Flo
 
 def place_step(assembly: Assembly) -> float:
     """Step of central differences of forces by places, m and rad."""
-    if assembly.has_rows:
-        return ROWS_STEP
-    return PLACE_STEP
+    return ROWS_STEP if assembly.has_rows else PLACE_STEP
 
 
 def _mass(frame: RotatingFrame, psi: float, u: Floats) -> Floats:

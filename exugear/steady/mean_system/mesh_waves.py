@@ -365,9 +365,7 @@ def _phases_ahead(assembly: Assembly, meshes: tuple[int, ...]) -> tuple[float, .
     """Cycles by which each mesh is ahead of the first, empty where all are in phase."""
     phases = assembly.meshes.phase[list(meshes)]
     apart = (phases - phases[0] + 0.5) % 1.0 - 0.5
-    if np.abs(apart).max() > IN_PHASE:
-        return tuple(float(own) for own in apart)
-    return ()
+    return tuple(float(own) for own in apart) if np.abs(apart).max() > IN_PHASE else ()
 
 
 def _turns_per_cycle(wave: MeshWave, planets: PlanetSet) -> int | None:
@@ -386,9 +384,7 @@ def _turns_per_cycle(wave: MeshWave, planets: PlanetSet) -> int | None:
 
 def _one_of(steps: set[int | None]) -> tuple[int | None]:
     """Return the common step of all meshes of a carrier, None where they differ."""
-    if len(steps) == 1:
-        return (next(iter(steps)),)
-    return (None,)
+    return (next(iter(steps)),) if len(steps) == 1 else (None,)
 
 
 def _row(assembly: Assembly, mesh: int, q: Floats, row: Floats) -> tuple[float, Floats]:

@@ -125,9 +125,7 @@ class SolidModel:
     @property
     def elements(self) -> Any:
         """The mesh itself, read from its file if necessary."""
-        if isinstance(self.mesh, SolidFile):
-            return self.mesh.mesh
-        return self.mesh
+        return self.mesh.mesh if isinstance(self.mesh, SolidFile) else self.mesh
 
 
 @dataclass(frozen=True)

@@ -335,7 +335,9 @@ class Parts:
             number = self.bodies[body]
             local = position - node_position(carrying)
         else:
-            number = self._ground_object()
+            if self._ground is None:
+                self._ground = self.mbs.AddObject(items.ObjectGround())
+            number = self._ground
             local = position
         return self.mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=number, localPosition=np.asarray(local).tolist()))
 
@@ -346,11 +348,6 @@ class Parts:
             return lambda: 0.0
         coordinates = exudyn.OutputVariableType.Coordinates
         return lambda: float(self.mbs.GetNodeOutput(node, coordinates)[SPIN_COORDINATE])
-
-    def _ground_object(self) -> Any:
-        if self._ground is None:
-            self._ground = self.mbs.AddObject(items.ObjectGround())
-        return self._ground
 
     def spin_marker(self, body: str, seat: str | None = None) -> Any:
         """Marker of a body's spin, of an elastic one at a seat or where torques act."""

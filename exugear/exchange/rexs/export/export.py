@@ -301,9 +301,7 @@ def _active(pair: GearPair, gear: Gear) -> tuple[float, float]:
         tangent = pair.base_tangent_length
         rolls = [roll + tangent if gear.internal else tangent - roll for roll in rolls]
     low, high = sorted(math.hypot(gear.base_radius, roll) for roll in rolls)
-    if gear.internal:
-        return (high, low)
-    return (low, high)
+    return (high, low) if gear.internal else (low, high)
 
 
 def put_static_forces(results: Results) -> None:

@@ -27,9 +27,7 @@ def name_in(key: str, version: Version) -> str:
     ('base_circle_diameter', 'base_diameter', 'custom_exugear_base_diameter')
     """
     known = [name for since, name in RESULTS[key].names.items() if since <= version]
-    if known:
-        return known[-1]
-    return OWN + key
+    return known[-1] if known else OWN + key
 
 
 def unit_in(unit: str, version: tuple[int, int]) -> str:

@@ -363,9 +363,7 @@ def _order_by_mating_planets(
     for body in earlier:
         for number, parts in enumerate((body.parts, *body.others)):
             if first & {part.number for part in parts} and len(body.angles) == len(placed):
-                if number:
-                    return placed[-number:] + placed[:-number]
-                return placed
+                return placed[-number:] + placed[:-number] if number else placed
     return placed
 
 
@@ -386,6 +384,4 @@ def _names(groups: Mapping[int, list[Component]], carriers: set[int]) -> dict[in
 
 
 def _lettered(name: str, number: int, count: int) -> str:
-    if count == 1:
-        return name
-    return f"{name}_{chr(ord('a') + number % 26)}"
+    return name if count == 1 else f"{name}_{chr(ord('a') + number % 26)}"

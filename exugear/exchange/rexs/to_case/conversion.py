@@ -392,9 +392,7 @@ class _GearboxDraft:
         entries = [
             f"{name} is {comment}" for name, comment in blocks.items() if name in words or name.split(".")[1] in words
         ]
-        if entries:
-            return f"{error} ({'; '.join(entries)})"
-        return error
+        return f"{error} ({'; '.join(entries)})" if entries else error
 
     def leave_stiff(self, source: str, path: str | Path) -> None:
         """Set bodies to rigid in all variants if their shape cannot contain the seats, and record the reason."""

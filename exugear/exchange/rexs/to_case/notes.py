@@ -35,9 +35,7 @@ class Entry:
     @property
     def comment(self) -> str:
         """Comment after the value."""
-        if self.kind:
-            return f"{self.kind}   {self.source}"
-        return self.source
+        return f"{self.kind}   {self.source}" if self.kind else self.source
 
 
 def read(value: Any, source: str) -> Entry:
@@ -265,9 +263,7 @@ class ComponentPositions(ReprMixin):
     def _outermost(self, parts: list[Component]) -> Floats:
         """Axes u, v, w of the gear unit as columns; those of the first part in a file without a gear unit."""
         first = [*self._model.components_of_type("gear_unit"), *parts][:1]
-        if first:
-            return self._frame(first[0], 0)[1]
-        return np.eye(3)
+        return self._frame(first[0], 0)[1] if first else np.eye(3)
 
     def _frame(self, part: Component, depth: int) -> tuple[Floats, Floats]:
         """Origin (3) and axes u, v, w as columns (3, 3), in the outermost frame."""

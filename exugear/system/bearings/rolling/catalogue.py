@@ -295,19 +295,14 @@ def _common(section: CatalogueSection) -> dict[str, Any]:
             f"element_count = {count} rolling elements of element_diameter_mm = {diameter:g} do not fit on "
             f"pitch_diameter_mm = {pitch:g}; {most} do"
         )
+    mean = 0.5 * (section.bore_mm + section.outer_diameter_mm)
     return {
         "element_diameter": MM * diameter,
         "pitch_diameter": MM * pitch,
         "element_count": count,
-        "radial_clearance": MM * (section.radial_clearance_mm - _thermal_change(section)),
+        "radial_clearance": MM * (section.radial_clearance_mm - (EXPANSION * mean * section.inner_ring_hotter_K)),
         "aligning": section.type in SPHERES,
     }
-
-
-def _thermal_change(section: CatalogueSection) -> float:
-    """Diametral clearance that a hotter inner ring takes, mm: alpha d_m times the difference of temperatures."""
-    mean = 0.5 * (section.bore_mm + section.outer_diameter_mm)
-    return EXPANSION * mean * section.inner_ring_hotter_K
 
 
 def _roller_row(section: CatalogueSection) -> RollerRow:
@@ -483,9 +478,7 @@ def _listed_as(section: CatalogueSection) -> tuple[str, ...]:
     if prefix is not None:
         return ()
     if section.type == "angular_contact_ball":
-        if suffix.startswith("B"):
-            return (f"{number}B",)
-        return ()
+        return (f"{number}B",) if suffix.startswith("B") else ()
     if section.type == "self_aligning_ball" and _SEALED.search(suffix):
         return ()
     return (number,)

@@ -132,9 +132,7 @@ def reference_life(
         for capacity, power in zip(capacities, (inner, outer), strict=True):
             mean = np.mean((stressed / (share * capacity)) ** power, axis=0) ** (1.0 / power)
             damage += float(np.sum(mean**exponent))
-    if damage == 0.0:
-        return math.inf
-    return float(damage ** (-1.0 / slope))
+    return math.inf if damage == 0.0 else float(damage ** (-1.0 / slope))
 
 
 def edge_stress_factors(laminae: int) -> Floats:
