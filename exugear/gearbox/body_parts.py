@@ -176,7 +176,9 @@ def gear_tube(gear: GearSection, z: float, shaft: Sequence[Tube]) -> Tube:
     reference = MM * gear.teeth * gear.normal_module_mm / math.cos(si(gear, "helix_angle_deg"))
     width = si(gear, "face_width_mm")
     held = si(gear, "held_diameter_mm")
-    under = [one.outer for one in shaft if one.start < z + 0.5 * width and one.start + one.length > z - 0.5 * width]
+    under = [
+        tube.outer for tube in shaft if tube.start < z + 0.5 * width and tube.start + tube.length > z - 0.5 * width
+    ]
     inner, outer = (reference, held) if gear.internal else (min(max([held, *under]), reference), reference)
     density = gear.material.density_kg_per_m3
     return Tube(start=z - 0.5 * width, length=width, outer=outer, inner=inner, density=density)
@@ -372,7 +374,7 @@ def _couplings_on_fixed_bodies(origin: Origin, bodies: Mapping[str, Body]) -> It
             continue
         if not _holds_on_a_fixed_body(origin, section):
             continue
-        on, body = sorted(section.bodies, key=lambda one: not origin.case.bodies[one].fixed)
+        on, body = sorted(section.bodies, key=lambda body: not origin.case.bodies[body].fixed)
         seat = origin.case.bearings.get(section.seat or "")
         place = bodies[body].centre_of_mass_z
         if seat is not None:

@@ -123,7 +123,7 @@ def _flagged(origin: Origin, what: Literal["shift", "tip"]) -> dict[str, GearSec
 def _pairs_of(origin: Origin, gears: Mapping[str, GearInputs], name: str) -> Iterator[tuple[str, UncheckedPair]]:
     """Yield the pairs of a gear with their names; gear 1 is the external or smaller gear."""
     for pair, section in origin.case.pairs.items():
-        both = [gears[one] for one in (section.pinion, section.gear) if one in gears]
+        both = [gears[gear] for gear in (section.pinion, section.gear) if gear in gears]
         if name in (section.pinion, section.gear) and len(both) == 2:
             first, second = sorted(both, key=lambda gear: (gear.internal, gear.teeth))
             distance = si(section, "centre_distance_mm")

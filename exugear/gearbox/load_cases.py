@@ -141,7 +141,7 @@ class LoadSummary(ReprMixin, line=" {name!r}: net torque {net_torque:g} N m, {st
     @property
     def fastest_rim(self) -> tuple[str, float]:
         """Body with the highest tip speed, and this speed, m/s; an empty name and zero for a rotor without gears."""
-        return max(self.rim_speeds.items(), key=lambda item: item[1], default=("", 0.0))
+        return max(self.rim_speeds.items(), key=lambda pair: pair[1], default=("", 0.0))
 
 
 def summarise_loads(

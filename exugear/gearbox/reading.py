@@ -161,7 +161,7 @@ def readable(content: Mapping[str, Any]) -> GearboxFile:
         pairs = found["pairs"].items()
         known = set(found["gears"])
         carriers = set(found["bodies"])
-        found["pairs"] = {name: one for name, one in pairs if not lost["gears"] or {one.pinion, one.gear} <= known}
+        found["pairs"] = {name: pair for name, pair in pairs if not lost["gears"] or {pair.pinion, pair.gear} <= known}
         broken = [
             pair for name, pair in written["pairs"].items() if name in lost["pairs"] and isinstance(pair, Mapping)
         ]

@@ -204,7 +204,7 @@ class _RatedBearing:
         pitch = rows[0].pitch_diameter
         limit = KN * (section.fatigue_load_limit_kN or 0.0) or fatigue_limit(ratings.static, pitch, section.type)
         clean = contamination_factor(oil.cleanliness, pitch)
-        ratios = np.array([viscosity_ratio(viscosity, float(one), pitch) for one in speed])
+        ratios = np.array([viscosity_ratio(viscosity, float(value), pitch) for value in speed])
         factors = [
             [life_factor(ratio, clean * limit / max(load, 1e-9), section.type) for load in row]
             for ratio, row in zip(ratios.tolist(), loads.tolist(), strict=True)

@@ -121,9 +121,9 @@ def check_strengths(
     """Refuse strengths of unknown gears, and alternating bending without Y_M; all errors are raised together."""
     errors: list[str] = []
     for name, strength in rating.gears.items():
-        flanks = {one.flank for one in teeth if one.gear == name}
+        flanks = {tooth.flank for tooth in teeth if tooth.gear == name}
         if not flanks:
-            known = ", ".join(sorted({one.gear for one in teeth}))
+            known = ", ".join(sorted({tooth.gear for tooth in teeth}))
             errors += gearbox.error(f"rating.gears.{name}: no gear of that name in a mesh; gears are {known}").errors
         elif (len(flanks) > 1 or reversed_too) and strength.mean_stress_factor is None:
             errors += gearbox.error(
@@ -219,10 +219,10 @@ LEAST_COUNTS = ("compression", "contact_limit", "root_limit")
 
 def worst_of(lives: Sequence[FlankLife]) -> FlankLife:
     """Return the worst of each value over the flanks of equal planets."""
-    contact = max(lives, key=lambda one: (np.nan_to_num(one.contact_damage, posinf=np.inf), one.contact_stress))
-    root = max(lives, key=lambda one: (np.nan_to_num(one.root_damage, posinf=np.inf), one.root_stress))
+    contact = max(lives, key=lambda life: (np.nan_to_num(life.contact_damage, posinf=np.inf), life.contact_stress))
+    root = max(lives, key=lambda life: (np.nan_to_num(life.root_damage, posinf=np.inf), life.root_stress))
     worst: dict[str, Any] = {}
-    for name in (one.name for one in fields(FlankLife) if one.type == "float"):
+    for name in (field.name for field in fields(FlankLife) if field.type == "float"):
         values = np.array([getattr(life, name) for life in lives])
         least = name.endswith(("_safety", "_static")) or name in LEAST_COUNTS
         worst[name] = float(values.min() if least else values.max())

@@ -359,7 +359,7 @@ def _unrated(assembly: Assembly, counted: CountedLoads, stresses: Mapping[str, M
     gearbox = assembly.gearbox
     lines = []
     rated = rating_of(gearbox).gears
-    for gear in dict.fromkeys(one.gear for one in counted.teeth):
+    for gear in dict.fromkeys(tooth.gear for tooth in counted.teeth):
         if gear not in rated:
             lines.append(f"gear {gear}: no strength; add [rating.gears.{gear}]")
     for pair in dict.fromkeys(mesh.pair.name for mesh in gearbox.meshes):
@@ -368,7 +368,7 @@ def _unrated(assembly: Assembly, counted: CountedLoads, stresses: Mapping[str, M
     for mesh in gearbox.meshes:
         if reason := outside_scope(mesh.pair):
             lines.append(f"{mesh.family}: no nominal stresses and no S_H and S_F to ISO 6336, {reason}")
-    for support in dict.fromkeys(one.family for one in assembly.supports if one.catalogue is None):
+    for support in dict.fromkeys(support.family for support in assembly.supports if support.catalogue is None):
         lines.append(f"{support}: defined by its stiffness only; add a [.catalogue] table for a rating life")
     if not assembly.supports:
         lines.append(f"bearings: the variant {assembly.variant} has none")

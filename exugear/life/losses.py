@@ -145,7 +145,7 @@ class Losses:
     def total(self) -> float:
         """All losses that are included, W."""
         meshes = sum(mesh.loss for mesh in self.meshes)
-        return meshes + sum(own.loss for own in self.bearings) + sum(seal.loss for seal in self.seals)
+        return meshes + sum(bearing.loss for bearing in self.bearings) + sum(seal.loss for seal in self.seals)
 
     @property
     def band(self) -> tuple[float, float]:
@@ -270,9 +270,11 @@ def _drags(
 ) -> dict[str, float]:
     """Torques of bearings and seals on both of their bodies, N m."""
     supports = {support.name: support for support in gearbox.bearings}
-    own = {bearing.family: bearing.loss / bearing.count for bearing in bearings}
+    single = {bearing.family: bearing.loss / bearing.count for bearing in bearings}
     losses = [
-        (supports[duty.name].body, supports[duty.name].on, own[duty.family]) for duty in duties if duty.name in supports
+        (supports[duty.name].body, supports[duty.name].on, single[duty.family])
+        for duty in duties
+        if duty.name in supports
     ]
     losses += [(gearbox.case.seals[seal.name].body, gearbox.case.seals[seal.name].on, seal.loss) for seal in seals]
     drags: dict[str, float] = {}

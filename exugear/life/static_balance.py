@@ -89,11 +89,11 @@ class StaticBalance(ReprMixin, line=": {torque!n} torques, {angle!n} angles, lin
         found = np.zeros((len(torque), *values.shape[1:]))
         for sign in (1.0, -1.0):
             wanted = torque >= 0.0 if sign > 0.0 else torque < 0.0
-            own = np.sign(self.torque) == sign
-            if not own.any():
-                own = ~own  # linear models are solved at one torque, of either sign
-            flat = values[own].reshape(int(own.sum()), -1)
-            inside = np.array([np.interp(torque[wanted], self.torque[own], column) for column in flat.T]).T
+            same_sense = np.sign(self.torque) == sign
+            if not same_sense.any():
+                same_sense = ~same_sense  # linear models are solved at one torque, of either sign
+            flat = values[same_sense].reshape(int(same_sense.sum()), -1)
+            inside = np.array([np.interp(torque[wanted], self.torque[same_sense], column) for column in flat.T]).T
             found[wanted] = inside.reshape(-1, *values.shape[1:])
         return found
 
@@ -110,10 +110,10 @@ class StaticBalance(ReprMixin, line=": {torque!n} torques, {angle!n} angles, lin
         """
         if torque is None:
             torque = self.torque[[np.abs(self.torque).argmax()]]
-        own = list(meshes)
-        forces = np.abs(self.at(self.mesh_force, torque, hub)[..., own]).max(axis=(1, 2))
+        names = list(meshes)
+        forces = np.abs(self.at(self.mesh_force, torque, hub)[..., names]).max(axis=(1, 2))
         worst = int(forces.argmax())
-        mean = float(np.abs(self.at(self.mesh_force, torque[[worst]])[..., own]).mean())
+        mean = float(np.abs(self.at(self.mesh_force, torque[[worst]])[..., names]).mean())
         if mean:
             return float(forces[worst]) / mean
         return 1.0
@@ -329,7 +329,7 @@ def _inner_rings(assembly: Assembly, q: Floats) -> tuple[Floats, Floats]:
     loads = assembly.bearing_loads(q, np.zeros_like(q))
     strains = assembly.support_strains(q)
     # The bearing has its factor's fraction of the deflection, the seat the rest; outer rings move the opposite way.
-    scales = np.array([one.factor * (-1.0 if one.carries_outer_ring else 1.0) for one in assembly.supports])
+    scales = np.array([support.factor * (-1.0 if support.carries_outer_ring else 1.0) for support in assembly.supports])
     turned = np.empty_like(loads)
     for number, support in enumerate(assembly.supports):
         angle = float(q[assembly.spin[support.on]]) if support.on in assembly.spin else 0.0
@@ -414,8 +414,8 @@ class ActingLoads:
         """Return the torques of one sign, including the points, with their rotor loads."""
         torque = self.torques
         hub = np.concatenate([self.points.other, self.worst_hub])
-        own = torque * sense > 0.0
-        return torque[own], hub[own]
+        same_sense = torque * sense > 0.0
+        return torque[same_sense], hub[same_sense]
 
     def sum_by_bin(self, values: Floats) -> Floats:
         """Sum values of points (points,) into the bins of the distribution, (bins,)."""

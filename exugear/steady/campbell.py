@@ -134,7 +134,7 @@ def _matches(one: Found, other: Found) -> tuple[Integers, Integers, Floats]:
 def _clarity(one: Found, other: Found, narrowest: float) -> float:
     """Minimum MAC for modes to be matched across a step, or less than `CLEAR` where a veering may be hidden in it."""
     rows, columns, values = _matches(one, other)
-    before, after = (own[0][places].imag for own, places in ((one, rows), (other, columns)))
+    before, after = (modes[0][places].imag for modes, places in ((one, rows), (other, columns)))
     far = np.triu(np.subtract.outer(before, before), 1)
     near = np.triu(np.subtract.outer(after, after), 1)
     first, second = np.nonzero(far * near < 0.0)
@@ -150,13 +150,13 @@ def _joined(speeds: Floats, found: list[Found]) -> ModeTracks:
     """Tracks from modes at each speed, in the order of their mean frequency."""
     places = [list(range(len(found[0][0])))]
     count = len(found[0][0])
-    for one, other in itertools.pairwise(found):
-        rows, columns, _ = _matches(one, other)
-        own = dict(zip(columns.tolist(), (places[-1][row] for row in rows), strict=True))
-        new = [n for n in range(len(other[0])) if n not in own]
-        own |= {n: count + number for number, n in enumerate(new)}
+    for before, after in itertools.pairwise(found):
+        rows, columns, _ = _matches(before, after)
+        tracks = dict(zip(columns.tolist(), (places[-1][row] for row in rows), strict=True))
+        new = [n for n in range(len(after[0])) if n not in tracks]
+        tracks |= {n: count + number for number, n in enumerate(new)}
         count += len(new)
-        places.append([own[n] for n in range(len(other[0]))])
+        places.append([tracks[n] for n in range(len(after[0]))])
     size = found[0][1].shape[1] // 2
     eigenvalues = np.full((len(speeds), count), complex(np.nan, np.nan))
     shapes, partners = np.zeros((2, len(speeds), count, size), dtype=np.complex128)
@@ -207,7 +207,7 @@ class ModeNamer:
         self.assembly, self._turn = frame.assembly, frame.matrices(0.0)[0]
         self._q = frame.state(0.0, speed, system.static_at(speed))[0]
         self._elements = linearise(self.assembly, self._q, frame.mean_meshes).stiffness
-        self._senses = {name: float(np.sign(own * speed)) for name, own in frame.speeds.items()}
+        self._senses = {name: float(np.sign(ratio * speed)) for name, ratio in frame.speeds.items()}
 
     def named(self, shape: Complexes) -> NamedMode:
         """Name a shape (size,) of the averaged system."""
@@ -279,15 +279,15 @@ class ModeNamer:
     def _wave_energy(self, slot: str, shape: Complexes) -> float:
         """Kinetic energy of the multi-blade component in the coordinates of a planet."""
         index = [i for i in self.assembly.coordinates[slot] if i >= 0]
-        own = shape[index]
-        return float((own.conj() @ self.system.mass[np.ix_(index, index)] @ own).real)
+        motion = shape[index]
+        return float((motion.conj() @ self.system.mass[np.ix_(index, index)] @ motion).real)
 
     def _central(self, planets: PlanetSet) -> set[str]:
         """Bodies that carry the planets or mesh with them."""
         meshes = (element.mesh for element in self.assembly.elements)
         ends = [{mesh.pinion, mesh.gear} for mesh in meshes]
-        own = set(planets.names)
-        return {planets.carrier}.union(*(pair for pair in ends if pair & own)) - own
+        planet_names = set(planets.names)
+        return {planets.carrier}.union(*(pair for pair in ends if pair & planet_names)) - planet_names
 
 
 def circle(x: complex, y: complex) -> float:
@@ -350,7 +350,7 @@ class Campbell(ReprMixin, line=": {names!n} modes at {speeds!n} speeds"):
             "mode_kind": (np.array(self.kinds, dtype=object), {}),
             "mode_name": (np.array(self.names, dtype=object), {}),
         }
-        return {name: (LAYOUT[name], own, attributes) for name, (own, attributes) in values.items()}
+        return {name: (LAYOUT[name], array, attributes) for name, (array, attributes) in values.items()}
 
 
 def modes_over_speed(system: MeanSystem, low: float, high: float, highest: float) -> ModeTracks:
@@ -378,8 +378,8 @@ def campbell_of(system: MeanSystem, tracks: ModeTracks) -> Campbell:
         tracks.frequency,
         tracks.damping,
         whirl,
-        tuple(own.kind for own in named),
-        tuple(own.name for own in named),
+        tuple(mode.kind for mode in named),
+        tuple(mode.name for mode in named),
     )
 
 

@@ -229,7 +229,7 @@ class HarmonicBalanceModel:
     @cached_property
     def quantities(self) -> tuple[Quantity, ...]:
         """Quantities that describe the response, made of its signals."""
-        return quantities_of([own.name for own in self.signal_names], mount_names(self.waves.assembly))
+        return quantities_of([name.name for name in self.signal_names], mount_names(self.waves.assembly))
 
     @cached_property
     def weights(self) -> Floats:
@@ -367,7 +367,7 @@ class HarmonicBalanceModel:
             travelling = mesh_waves(self.system, more)
             self._one_by_one[more] = HarmonicBalanceModel(travelling, usual.harmonics // 2, usual.combinations // 2)
         other = self._one_by_one[more]._copied()
-        slow = [own for _, own in other.waves.carriers]
+        slow = [planets for _, planets in other.waves.carriers]
         other._one_by_one, other._lattices, other._reach = self._one_by_one, self._lattices, self._reach
         loud = self.lines.part(strong).select_bases(bases)
         whole = self.larger.select_bases(bases)
@@ -580,12 +580,12 @@ class HarmonicBalanceModel:
 
 def _stacked(ports: list[MeshInterface]) -> dict[str, Floats]:
     """Arrays of ports at several speeds (speeds, ...), by their names."""
-    by_name = {own.name: [getattr(port, own.name) for port in ports] for own in fields(MeshInterface)}
+    by_name = {field.name: [getattr(port, field.name) for port in ports] for field in fields(MeshInterface)}
     return {name: np.array(values) for name, values in by_name.items() if values[0] is not None}
 
 
 def _lines_within(waves: MeshWaves, reach: HarmonicTruncation) -> LineSet:
     """Orders up to a limit, with the sidebands caused by planets that mesh out of phase."""
     lines = line_set(waves.base_orders.tolist(), reach.harmonics, reach.combinations)
-    modulators = [own for _, own in waves.carriers]
+    modulators = [planets for _, planets in waves.carriers]
     return beside(lines, modulators, 0) if waves.passing else modulated(lines, modulators)

@@ -130,7 +130,7 @@ class HarmonicResidual:
             found = [model.cycle_coefficients, model.cycle_pulls]
             found += [*model.cycle_moments, model.cycle_moments_beyond] if model.shuttles else []
         rate = 2j * np.pi * np.arange(model.harmonics + 1)
-        return np.stack([own * rate**order for own in found for order in range(3)], axis=1)
+        return np.stack([curve * rate**order for curve in found for order in range(3)], axis=1)
 
     @cached_property
     def _lattice_stiffness(self) -> Floats:
@@ -166,8 +166,8 @@ class HarmonicResidual:
             else:
                 found.append(self._sample_row(n, readings[:, u], stiffness[..., u]))
         shape = self.interface.ports.forces.shape[1], readings.shape[2]
-        found = [widened(own, *shape) for own in found]
-        return LawSamples(*(np.stack(own, axis=1) for own in zip(*found, strict=True)))
+        found = [widened(samples, *shape) for samples in found]
+        return LawSamples(*(np.stack(samples, axis=1) for samples in zip(*found, strict=True)))
 
     def _sample_row(self, wave: int, readings: Floats, stiffness: Floats) -> LawSamples:
         """Sample the law of a mesh along a row with readings (s, r), stiffness (3 q, s)."""
@@ -518,9 +518,9 @@ def candidates(model: HarmonicBalanceModel, low: float, high: float) -> tuple[Ca
     slow = min(abs(low), abs(high))
     found = []
     for base, order in enumerate(model.waves.base_orders):
-        own = np.array([wave.base == base for wave in model.waves.waves])
+        of_base = np.array([wave.base == base for wave in model.waves.waves])
         for harmonic in range(1, model.harmonics + 1):
-            tangents = {at: own * values[:, harmonic] for at, values in model.cycle_tangents.items()}
+            tangents = {at: of_base * values[:, harmonic] for at, values in model.cycle_tangents.items()}
             turned = {at: values.conj() for at, values in tangents.items()}
             for sign in (1.0, -1.0):
                 there = _couple_modes(felt, tangents, seen.conj() if sign > 0.0 else seen)
@@ -574,10 +574,10 @@ def growth_at(balance: HarmonicResidual, readings: Complexes, base: int, least: 
     by_rates = np.zeros_like(rows) if ports.rates is None else ports.rates.reshape(-1, size)
     reads = np.block([[rows, by_rates], [carried, rows]])
     # Meshes of other bases do not vary: they belong to the constant part. Bearings do with all bases.
-    own = np.ones(len(model.weights), dtype=bool)
-    own[: len(model.waves.waves)] = [wave.base == base for wave in model.waves.waves]
-    pushed = np.repeat(own, ports.forces.shape[1])
-    read = np.tile(np.repeat(own, ports.readings.shape[1]), 2)
+    of_base = np.ones(len(model.weights), dtype=bool)
+    of_base[: len(model.waves.waves)] = [wave.base == base for wave in model.waves.waves]
+    pushed = np.repeat(of_base, ports.forces.shape[1])
+    read = np.tile(np.repeat(of_base, ports.readings.shape[1]), 2)
     constant = np.vstack([np.eye(size, 2 * size, size), lower])
     constant -= pushes[:, ~pushed] @ varying[0][np.ix_(~pushed, ~read)] @ reads[~read]
     # Many slopes are zero: what nothing pushes along or reads costs nothing then.

@@ -328,9 +328,9 @@ def _state_near(model: HarmonicBalanceModel, interface: Interface, leg: Settling
         found = _refined(model, interface.speed, readings)
     except HarmonicBalanceError:
         return None
-    own = found.on(model)
+    state = found.on(model)
     # Phases hang on the last of the damping, to which the drive of the run adds.
-    difference = np.linalg.norm((np.abs(own.readings) - np.abs(readings))[1:, :, DEFLECTION])
+    difference = np.linalg.norm((np.abs(state.readings) - np.abs(readings))[1:, :, DEFLECTION])
     if difference < SAME_STATE_TOL * np.linalg.norm(readings[1:, :, DEFLECTION]):
         return found
     return None

@@ -33,14 +33,14 @@ def frame_coordinates(frame: RotatingFrame, q: Floats, psi: Floats) -> Floats:
     u = q - np.outer(psi, assembly.rolling_velocity(still, frame.speeds))
     bend = assembly.rolling_acceleration(still, frame.speeds, dict.fromkeys(frame.speeds, 0.0))
     for planets in frame.sets:
-        own = np.array([assembly.coordinates[name] for name in planets.names])
-        if own[0, 0] >= 0:
-            _turn_back(u, q, planets, own, psi, bend)
+        coordinates = np.array([assembly.coordinates[name] for name in planets.names])
+        if coordinates[0, 0] >= 0:
+            _turn_back(u, q, planets, coordinates, psi, bend)
         shapes = planets.values(planets.ratio * psi)
         back = shapes / (shapes**2).sum(axis=1, keepdims=True)
-        for axis in range(own.shape[1]):
-            if own[0, axis] >= 0:
-                u[:, own[:, axis]] = np.einsum("spw,sp->sw", back, u[:, own[:, axis]])
+        for axis in range(coordinates.shape[1]):
+            if coordinates[0, axis] >= 0:
+                u[:, coordinates[:, axis]] = np.einsum("spw,sp->sw", back, u[:, coordinates[:, axis]])
     return u
 
 

@@ -441,8 +441,8 @@ def _change_with_more(solver: PointSolver, solved: SolvedPoints) -> float:
     for point, line in found[:CHECKED]:
         place, _ = other.model.lines.find(model.lines.index[line])
         response = other.response(float(solved.speed[point]))
-        own = 2.0 * abs(complex(signals(other.model, response)[int(place), 0]))
-        changes.append(abs(own / max(float(values[point, line]), 1e-300) - 1.0))
+        amplitude = 2.0 * abs(complex(signals(other.model, response)[int(place), 0]))
+        changes.append(abs(amplitude / max(float(values[point, line]), 1e-300) - 1.0))
     return max(changes)
 
 

@@ -87,8 +87,8 @@ def _filled(shape: tuple[int, ...], done: list[tuple[tuple[int, ...], Record]], 
 
 
 def _row(record: Record, name: str, labels: list[str]) -> list[float]:
-    own = record.values.get(name) or {}
-    return [number_of(own.get(label)) for label in labels]
+    value = record.values.get(name) or {}
+    return [number_of(value.get(label)) for label in labels]
 
 
 def _point_variables(
@@ -230,7 +230,7 @@ class Criteria:
         """Read the criteria from a study file with a section `optimise`."""
         wanted = study.optimise
         assert wanted is not None
-        limits = tuple(one for name, limit in wanted.limits.items() for one in _limits(name, limit))
+        limits = tuple(text for name, limit in wanted.limits.items() for text in _limits(name, limit))
         return cls(tuple(wanted.minimise), limits, wanted.percentile or USUAL_PERCENTILE)
 
     @property

@@ -285,12 +285,12 @@ def _built(task: Task, work: PointInput) -> Gearbox:
         check_parts(gearbox)
         return gearbox
     except GearboxFileError as error:
-        own = [
+        lines = [
             f"parameters.{task.parameters.get(path, '?')}: {path} = {value!r}"[:LONGEST_VALUE]
             for path, value in work.changes.items()
         ]
-        more = [f"and {len(own) - SHOWN_VALUES} more"] if len(own) > SHOWN_VALUES else []
-        raise GearboxFileError(*("; ".join([*own[:SHOWN_VALUES], *more]) for _ in own[:1]), *error.errors) from None
+        more = [f"and {len(lines) - SHOWN_VALUES} more"] if len(lines) > SHOWN_VALUES else []
+        raise GearboxFileError(*("; ".join([*lines[:SHOWN_VALUES], *more]) for _ in lines[:1]), *error.errors) from None
 
 
 def _journal_form(values: Values) -> Any:

@@ -152,8 +152,8 @@ def _combinations(values: xr.DataArray, dimensions: list[str]) -> list[str]:
     """Return the labels of all combinations along some dimensions."""
     labels = [""]
     for dimension in dimensions:
-        own = values[dimension].to_numpy() if dimension in values.coords else np.arange(values.sizes[dimension])
-        words = [f"{entry:.4g}" if isinstance(entry, float) else str(entry) for entry in own]
+        coordinate = values[dimension].to_numpy() if dimension in values.coords else np.arange(values.sizes[dimension])
+        words = [f"{entry:.4g}" if isinstance(entry, float) else str(entry) for entry in coordinate]
         labels = [f"{before}, {word}".removeprefix(", ") for before in labels for word in words]
     return labels
 

@@ -134,8 +134,8 @@ class Shared:
 
     def bodies(self, gearbox: Gearbox, inertias: str) -> dict[str, ElasticBody]:
         """Return the reduced flexible bodies; computed once, under a lock."""
-        own = {key: value for key, value in gearbox.content.items() if key not in UNRELATED}
-        key = hashlib.sha256(json.dumps(own, sort_keys=True).encode()).hexdigest()
+        related = {key: value for key, value in gearbox.content.items() if key not in UNRELATED}
+        key = hashlib.sha256(json.dumps(related, sort_keys=True).encode()).hexdigest()
         folder = self.folder / "bodies"
         with _waiting(folder / f"{key[:32]}.lock"):
             return reduced_bodies(gearbox, inertias, folder)

@@ -179,7 +179,7 @@ def planet_values(results: PointResults, family: str, values: Floats) -> Floats:
         There is no such family.
     """
     families = [mesh.family for mesh in results.gearbox.meshes]
-    chosen = [n for n, own in enumerate(families) if own == family]
+    chosen = [n for n, members in enumerate(families) if members == family]
     if not chosen:
         raise PointError(f"no meshes {family!r}; meshes are {', '.join(dict.fromkeys(families))}")
     return np.asarray(values[..., chosen], dtype=np.float64)
@@ -235,7 +235,7 @@ def order_amplitudes(
 
 def run_harmonics(results: PointResults, *, mesh: str, count: int = 6, signal: str = OVERALL) -> dict[str, float]:
     """Amplitudes of a signal at the order of a mesh and its multiples, in a run of at least two input revolutions."""
-    meshes = {own.family: own.name for own in results.gearbox.meshes}
+    meshes = {mesh.family: mesh.name for mesh in results.gearbox.meshes}
     if mesh not in meshes:
         raise PointError(f"no meshes {mesh!r}; meshes are {', '.join(meshes)}")
     order = results.gearbox.train.mesh_frequencies(2.0 * math.pi)[meshes[mesh]]
@@ -522,8 +522,8 @@ def _bearing_values(results: PointResults, key: str, by: str, worst: Worst) -> d
 
 def _worst(values: Mapping[str, float], part: str, worst: Worst) -> float:
     """Return the worst known value of all parts or of one."""
-    own = {name: value for name, value in values.items() if part in ("", name, name.split(" ")[0])}
-    known = [value for value in own.values() if not math.isnan(value)]
+    selected = {name: value for name, value in values.items() if part in ("", name, name.split(" ")[0])}
+    known = [value for value in selected.values() if not math.isnan(value)]
     if not known:
         raise PointError(f"{part or 'no part'}: the life of this gearbox has no such result; `exugear life` states why")
     return worst(known)

@@ -460,9 +460,9 @@ def drawn_values(
     draws: list[dict[str, float]] = [{} for _ in range(count)]
     first = 0
     for name, parameter in drawn.items():
-        own = cube[:, first : first + members[name]]
+        columns = cube[:, first : first + members[name]]
         first += members[name]
-        values = distribution_of(parameter, gearbox).at(correlated(own, parameter.correlation))
+        values = distribution_of(parameter, gearbox).at(correlated(columns, parameter.correlation))
         axes |= _drawn_axes(name, parameter, values)
         for n, row in enumerate(values):
             for m, path in enumerate(parameter.targets):

@@ -149,7 +149,7 @@ def errors_of_paths(study: StudyFile) -> Iterator[str]:
     """
     owners: list[tuple[str, str, str]] = []
     for table, name, parameter in (
-        *(("parameters", name, own) for name, own in study.parameters.items()),
+        *(("parameters", name, parameter) for name, parameter in study.parameters.items()),
         *(("tolerances", name, tolerance) for name, tolerance in study.tolerances.items()),
     ):
         paths = (parameter.path,) if parameter.path else tuple(parameter.paths or parameter.targets)
@@ -184,10 +184,10 @@ def errors_of_values(design: Design) -> Iterator[str]:
 
 def errors_of_options(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choice) -> Iterator[str]:
     """Report invalid options of the built-in outputs: out of range, or missing in this gearbox."""
-    own = {id(quantity) for quantity in QUANTITIES.values()}
+    built_in = {id(quantity) for quantity in QUANTITIES.values()}
     known = _names(gearbox, choice)
     for name, output in kept.items():
-        if id(output.quantity) not in own:
+        if id(output.quantity) not in built_in:
             continue
         for key, value in output.options.items():
             entries = value if isinstance(value, list) else [value]
@@ -229,9 +229,9 @@ def errors_of_signals(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choi
     """Report signals and orders that neither runs nor steady-state responses of this gearbox have."""
     tabled = choice.mesh_model == "table"
     jointed = choice.variant.spins_only
-    of_runs = [one for one in signals_of(tabled, jointed) if one.stored and one.dimensions[0] == "time"]
+    of_runs = [signal for signal in signals_of(tabled, jointed) if signal.stored and signal.dimensions[0] == "time"]
     families = [mesh.family for mesh in gearbox.meshes]
-    named = [one.options.get("signal", OVERALL) for one in kept.values() if one.quantity.needs == "steady"]
+    named = [output.options.get("signal", OVERALL) for output in kept.values() if output.quantity.needs == "steady"]
     steady = _steady_signals(gearbox, choice) if any(signal != OVERALL for signal in named) else []
     for name, output in kept.items():
         signal = str(output.options.get("signal", OVERALL))
@@ -242,8 +242,8 @@ def errors_of_signals(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choi
                 yield f"outputs.{name}.signal = {signal[:200]!r}: no such signal; there are {_listed(known)}"
         elif output.quantity.needs == "steady":
             if signal != OVERALL and named_amplitudes(steady, np.zeros(len(steady), complex), signal) is None:
-                places = dict.fromkeys(" ".join(own.split(" ")[:2]) for own in steady)
-                known = [*places, *(own for own in steady if own not in places)]
+                places = dict.fromkeys(" ".join(name.split(" ")[:2]) for name in steady)
+                known = [*places, *(name for name in steady if name not in places)]
                 yield f"outputs.{name}.signal = {signal[:200]!r}: no such signal; {nearest_names(signal, known)}"
             yield from _errors_of_line(name, output, families)
 
@@ -252,9 +252,9 @@ def _steady_signals(gearbox: Gearbox, choice: Choice) -> list[str]:
     """Return the names of all signals of a steady-state response, which do not depend on flexibility and mesh model."""
     variant = Variant.bushing if choice.variant.is_elastic else choice.variant
     law = "iso6336"
-    own = Choice(variant, law, choice.inertias)
+    plain = Choice(variant, law, choice.inertias)
     with suppress(BalanceError):
-        system = mean_system(assemble(gearbox, own, mesh_stiffness(gearbox, law)), np.ones(1))
+        system = mean_system(assemble(gearbox, plain, mesh_stiffness(gearbox, law)), np.ones(1))
         rows = signal_rows(system, 1.0).names
         return [signal.name for signal in (*rows, *mesh_signal_names(mesh_waves(system)))]
     return []
@@ -482,8 +482,8 @@ def _settings(file: StudyFile) -> PointSettings:
     """Return the settings for the results of points."""
     steady = None
     if file.steady is not None:
-        own = file.steady
-        check_law(file.choice.mesh_model, own.method)
-        speeds = SpeedRange.from_text(own.speeds)
-        steady = SteadySettings(speeds, own.method, own.harmonics, own.combinations, own.at_resonances)
+        section = file.steady
+        check_law(file.choice.mesh_model, section.method)
+        speeds = SpeedRange.from_text(section.speeds)
+        steady = SteadySettings(speeds, section.method, section.harmonics, section.combinations, section.at_resonances)
     return PointSettings(steady, file.run.duration_s, file.run.solver)

@@ -209,12 +209,12 @@ def elastic_arrays(flexible: Mapping[str, ElasticBody], size: int, damping_time:
         if body.frame == "carrier":
             begin += body.size
             continue
-        own = [block[np.argsort(-body.spin[block], kind="stable")] for block in body.blocks]
+        sorted_blocks = [block[np.argsort(-body.spin[block], kind="stable")] for block in body.blocks]
         carried = body.mass @ body.spin
-        spinning = next((n for n, block in enumerate(own) if body.spin[block].any()), 0)
+        spinning = next((n for n, block in enumerate(sorted_blocks) if body.spin[block].any()), 0)
         inertia = float(body.spin @ carried) or 1.0
-        for block in own:
-            others = [n for n, other in enumerate(own) if body.gyroscopic[np.ix_(block, other)].any()]
+        for block in sorted_blocks:
+            others = [n for n, other in enumerate(sorted_blocks) if body.gyroscopic[np.ix_(block, other)].any()]
             if len(others) > 1:
                 raise VariantError(f"body {body.name}: gyroscopic forces couple one block to {len(others)} others")
             turning.append(len(blocks) + spinning)
@@ -222,10 +222,12 @@ def elastic_arrays(flexible: Mapping[str, ElasticBody], size: int, damping_time:
             parts["stiffness"].append(body.stiffness[np.ix_(block, block)])
             parts["mass"].append(body.mass[np.ix_(block, block)])
             parts["inverse"].append(np.asarray(np.linalg.inv(body.mass[np.ix_(block, block)]), dtype=np.float64))
-            parts["gyroscopic"].append(body.gyroscopic[np.ix_(block, own[others[0]])] if others else np.zeros((0, 0)))
+            parts["gyroscopic"].append(
+                body.gyroscopic[np.ix_(block, sorted_blocks[others[0]])] if others else np.zeros((0, 0))
+            )
             spin.append(body.spin[block])
             momentum.append(carried[block] / inertia)
-        blocks += [block + begin for block in own]
+        blocks += [block + begin for block in sorted_blocks]
         begin += body.size
     if not blocks:
         return no_elastic()

@@ -69,7 +69,7 @@ def with_modal_damping(assembly: Assembly, percent: float | None = None) -> Asse
     train = gearbox.train
     still = np.zeros(assembly.size)
     speeds = [dict(zip(train.spins, column.tolist(), strict=True)) for column in train.kinematic_modes.T]
-    rolling = np.array([assembly.rolling_velocity(still, own) for own in speeds]).T
+    rolling = np.array([assembly.rolling_velocity(still, speed) for speed in speeds]).T
     carried = linear.mass @ rolling
     columns -= carried @ np.linalg.solve(rolling.T @ carried, rolling.T @ columns)
     return replace(assembly, modal=_arrays(assembly, columns))
@@ -145,7 +145,7 @@ def damping_ratios(section: DampingSection, frequency: Floats) -> Floats:
         if not (place <= TAKEN * near).any():
             raise VariantError(
                 f"damping.modal_modes: no mode within {100 * TAKEN:g} % of {near:g} Hz; modes are at "
-                f"{', '.join(f'{own:.4g}' for own in frequency[np.argsort(place)][:NAMED])} Hz, ..."
+                f"{', '.join(f'{value:.4g}' for value in frequency[np.argsort(place)][:NAMED])} Hz, ..."
             )
         ratios[np.argmin(place)] = 0.01 * percent_of_mode
     return np.asarray(ratios)

@@ -122,7 +122,7 @@ def mode_name(assembly: Assembly, element_names: tuple[str, ...], kinetic: Float
         strained[family] = strained.get(family, 0.0) + float(share)
     words = []
     described = 0.0
-    for what, share in sorted(moving.items(), key=lambda item: -item[1]):
+    for what, share in sorted(moving.items(), key=lambda pair: -pair[1]):
         if described >= 0.8 or share < 0.05:
             break
         words.append(f"{what} {100 * share:.0f} %")

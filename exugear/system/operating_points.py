@@ -290,7 +290,7 @@ def _equal_supports(assembly: Assembly) -> list[PlanetSupports]:
         names = [planet.name for planet in planets]
         angles = np.array([planet.orbit_angle for planet in planets])
         found += planet_supports(assembly.supports, names, angles)
-    return [own for own in found if all(is_catalogued(assembly.supports[n]) for n in own.numbers)]
+    return [point for point in found if all(is_catalogued(assembly.supports[n]) for n in point.numbers)]
 
 
 def _what_holds_one_way(laws: Sequence[SupportLaw], names: Sequence[str]) -> str:

@@ -64,7 +64,7 @@ def part_warnings(gearbox: Gearbox) -> Iterator[str]:
 
 def _speed_limits(gearbox: Gearbox) -> Iterator[str]:
     """Compare seals and bearings with their speed limits, at the highest speed of operation and of all load cases."""
-    limited = [one for one in gearbox.bearings if one.catalogue and one.catalogue.speed_limit_rpm]
+    limited = [bearing for bearing in gearbox.bearings if bearing.catalogue and bearing.catalogue.speed_limit_rpm]
     if not gearbox.case.seals and not limited:
         return
     fastest = (operating_range(gearbox) or (0.0, 0.0))[1]
@@ -186,8 +186,8 @@ def _bores_beside(gearbox: Gearbox, body: Body, place: float) -> tuple[float, fl
         for bearing in gearbox.bearings
         if bearing.catalogue is not None and bearing.body == body.name
     ]
-    before = [one for one in known if one[0] < place]
-    behind = [one for one in known if one[0] > place]
+    before = [other for other in known if other[0] < place]
+    behind = [other for other in known if other[0] > place]
     if before and behind:
         return (max(before)[1], min(behind)[1])
     return None

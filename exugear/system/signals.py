@@ -529,13 +529,13 @@ def _joint_moments(assembly: Assembly, run: Mapping[str, Floats]) -> Floats:
     places = _Places(assembly, np.append(0.0, np.cumsum(steps)))
     # What a joint takes of its own body: the file's force less what planets hand on; it acts at the node but for the
     # moments of meshes about that.
-    own = force.copy()
+    loads = force.copy()
     moments = np.zeros_like(force)
     for joint in joints:
         if joint.on in number:
-            own[number[joint.on]] -= force[number[joint.body]]
+            loads[number[joint.on]] -= force[number[joint.body]]
     for n, joint in enumerate(joints):
-        moments[n] = np.cross(places.of(joint.body), own[n])
+        moments[n] = np.cross(places.of(joint.body), loads[n])
     for element, scalar in zip(assembly.elements, np.asarray(run["mesh_force"], dtype=np.float64).T, strict=True):
         rows = element.force.reshape(2, BODY_SIZE)[:, TILT:] / element.line_of_action
         for body, row in zip((element.mesh.pinion, element.mesh.gear), rows, strict=True):

@@ -350,8 +350,8 @@ def _check_shoulders(assembly: Assembly, q: Floats) -> None:
     """
     loads = assembly.support_loads_at_rest(q)
     has_rows = np.diff(assembly.connectors.rolling.first) > 0
-    for support, load, own in zip(assembly.supports, loads, has_rows, strict=True):
-        if not own or support.catalogue is None:
+    for support, load, rolling in zip(assembly.supports, loads, has_rows, strict=True):
+        if not rolling or support.catalogue is None:
             continue
         rows = catalogue_rows(support.catalogue)
         if not holds_one_way(rows):

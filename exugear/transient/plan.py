@@ -126,11 +126,11 @@ def too_fine(step: float, total: float, sample_rate: float) -> str:
     >>> too_fine(1e-12, 30.0, 20e3)
     'step = 1e-12 s: 3e+13 steps, 5e+07 for each stored sample; at most 1000 are permitted, a step of 5e-08 s'
     """
-    each = 1.0 / (step * sample_rate)
-    if each <= MOST_STEPS_PER_SAMPLE * (1.0 + 1e-9):
+    interval = 1.0 / (step * sample_rate)
+    if interval <= MOST_STEPS_PER_SAMPLE * (1.0 + 1e-9):
         return ""
     return (
-        f"step = {step:.3g} s: {total / step:.3g} steps, {each:.3g} for each stored sample; at most "
+        f"step = {step:.3g} s: {total / step:.3g} steps, {interval:.3g} for each stored sample; at most "
         f"{MOST_STEPS_PER_SAMPLE} are permitted, a step of {1.0 / (MOST_STEPS_PER_SAMPLE * sample_rate):.3g} s"
     )
 

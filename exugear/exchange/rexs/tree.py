@@ -291,7 +291,7 @@ class Model(ReprMixin, line=" REXS {version}: {components!n} components, {relati
     def related(self, relation: str, role: str, number: int, wanted: str) -> tuple[Component, ...]:
         """Return the components in the role `wanted` of all relations in which a component has a role."""
         found = self._relations_by_role.get((relation, role, number), ())
-        return tuple(self.components[one.roles[wanted]] for one in found if wanted in one.roles)
+        return tuple(self.components[relation.roles[wanted]] for relation in found if wanted in relation.roles)
 
     def parts_of(self, owner: Component, kind: str) -> list[Component]:
         """Return the parts of a type in the assembly of a component."""
@@ -304,7 +304,7 @@ class Model(ReprMixin, line=" REXS {version}: {components!n} components, {relati
     @cached_property
     def _relations_by_role(self) -> dict[tuple[str, str, int], list[Relation]]:
         by_role: dict[tuple[str, str, int], list[Relation]] = {}
-        for relation in sorted(self.relations, key=lambda one: one.order):
+        for relation in sorted(self.relations, key=lambda relation: relation.order):
             for role, number in relation.roles.items():
                 by_role.setdefault((relation.type, role, number), []).append(relation)
         return by_role

@@ -94,7 +94,7 @@ class SourceSection(Section):
         ways = ("hours_per_year", "events_per_year", "hours_table", "wind")
         given = sum(getattr(self, way) is not None for way in ways)
         points = (self.torque_N_m, self.speed_rpm, self.hours)
-        stated = [own for own in points if own is not None]
+        stated = [point for point in points if point is not None]
         if (self.file is not None) + (self.files is not None) + bool(stated) != 1:
             raise ValueError("a source requires file, files, or torque_N_m with speed_rpm and hours; set one of them")
         if stated and len({len(own) for own in stated}) + len(points) - len(stated) != 1:
@@ -190,8 +190,8 @@ class StrengthSection(Section):
 
     @model_validator(mode="after")
     def _curves(self) -> StrengthSection:
-        own = (self.contact_curve is not None, self.bending_curve is not None)
-        if (self.curve is None) != all(own) or (self.curve is not None and any(own)):
+        curves = (self.contact_curve is not None, self.bending_curve is not None)
+        if (self.curve is None) != all(curves) or (self.curve is not None and any(curves)):
             raise ValueError("set curve, or contact_curve and bending_curve")
         for key in ("contact_curve", "bending_curve"):
             points = getattr(self, key) or ()

@@ -272,12 +272,12 @@ class SeriesReader:
             raise self.gearbox.error(
                 f"{self.key}.skip_s: this key is missing; set the time to skip at the start, 0 for none"
             )
-        own = {}
+        channels = {}
         if series.path.suffix.lower() == ".csv":
-            own = {"torque": f"{self.body}_N_m", "speed": f"{self.body}_rpm"}
+            channels = {"torque": f"{self.body}_N_m", "speed": f"{self.body}_rpm"}
         found = []
         for quantity, given in (("torque", self.source.torque), ("speed", self.source.speed)):
-            name = given or own.get(quantity)
+            name = given or channels.get(quantity)
             if name is None:
                 shown = ", ".join(series.names[:8])
                 raise self.gearbox.error(

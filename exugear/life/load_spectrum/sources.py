@@ -519,7 +519,7 @@ class _SourceDraft:
             return group * pool.files
         if section.events_per_year is not None:
             return section.events_per_year * pool.seconds / 3600.0
-        return (section.hours_per_year or 0.0) * pool.seconds / sum(one.seconds for one in self.pools.values())
+        return (section.hours_per_year or 0.0) * pool.seconds / sum(pool.seconds for pool in self.pools.values())
 
     def _ranges(self, by_wind: Mapping[float, float]) -> dict[tuple[str, float], float]:
         """Return the equivalent ranges of all pools, weighted by their hours."""

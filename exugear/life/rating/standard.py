@@ -268,7 +268,7 @@ def _run_in(rules: FlankRules, deviations: FlankDeviations | None, velocity: flo
 def _mean(rules: FlankRules, taken: Callable[[Hardening, float], float]) -> float:
     """Return the mean running-in allowance of both gears; zero without their strength."""
     known = [strength for strength in rules.strengths if strength is not None]
-    values = [taken(hardening_of(one), si(one, "sigma_H_lim_MPa")) for one in known]
+    values = [taken(hardening_of(strength), si(strength, "sigma_H_lim_MPa")) for strength in known]
     if values:
         return sum(values) / len(values)
     return 0.0
@@ -317,8 +317,8 @@ def _contact_influences(rules: FlankRules, velocity: float) -> tuple[float, floa
     known = [strength for strength in rules.strengths if strength is not None]
     if not known:
         return math.nan, math.nan, math.nan
-    softer = MPA * min(one.sigma_H_lim_MPa for one in known)
-    roughness = sum(roughness_of(one) for one in known) / len(known)
+    softer = MPA * min(strength.sigma_H_lim_MPa for strength in known)
+    roughness = sum(roughness_of(strength) for strength in known) / len(known)
     return (
         lubricant_factor(softer, rules.viscosity),
         velocity_factor(softer, velocity),

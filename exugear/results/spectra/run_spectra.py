@@ -415,7 +415,7 @@ class Comparison(ReprMixin):
     def _lacking(self, run: VariantRun, other: VariantRun) -> tuple[Finding, ...]:
         # The highest peak decides for the whole resonance, because a weak order may be absent although the highest is
         # not.
-        absent = set(only_in_first((own.strongest for own in run.findings()), other.spectra, self.rule))
+        absent = set(only_in_first((finding.strongest for finding in run.findings()), other.spectra, self.rule))
         return tuple(finding for finding in run.findings() if finding.strongest in absent)
 
     @property
@@ -486,7 +486,7 @@ def _with_window(
     signals: Mapping[str, RunSignals], lines: Sequence[OrderLine], length: float, rule: AbsenceRule | None
 ) -> OtherWindow:
     spectra = {variant: signal.waterfall(length) for variant, signal in signals.items()}
-    picks = {variant: pick_resonances(own, lines) for variant, own in spectra.items()}
+    picks = {variant: pick_resonances(spectrum, lines) for variant, spectrum in spectra.items()}
     absent = {
         (variant, other): only_in_first(picks[variant], spectra[other], rule)
         for variant in spectra

@@ -350,7 +350,7 @@ def predicted_top(
     found = [float(places[highest]), float(size(values)[highest])]
     # Where curves through other neighbours differ, the highest is to be looked at.
     for first in range(max(highest - 3, 0), min(highest, len(places) - NEIGHBOURS + 1)):
-        found = max(found, list(_top(places, values, highest, first, size)), key=lambda own: own[1])
+        found = max(found, list(_top(places, values, highest, first, size)), key=lambda peak: peak[1])
     return found[0], found[1]
 
 

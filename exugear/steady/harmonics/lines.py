@@ -206,8 +206,8 @@ def modulated(lines: LineSet, modulators: Sequence[Modulator]) -> LineSet:
     >>> [tuple(row) for row in lines.index.tolist()]
     [(0, 0, 0), (1, 0, -1), (1, 0, 0), (1, 0, 1), (0, 1, 0)]
     """
-    own = np.array([modulator.order for modulator in modulators])
-    bases = np.append(lines.bases, own)
+    orders = np.array([modulator.order for modulator in modulators])
+    bases = np.append(lines.bases, orders)
     rows: set[tuple[int, ...]] = set()
     for line in lines.index[1:]:
         for turns in itertools.product(*(modulator.turns(line) for modulator in modulators)):
@@ -495,8 +495,8 @@ class HarmonicCoupling:
             blocks = blocks + coefficients * len(group.harmonics)
         places, conjugates, at_blocks = (np.concatenate(own) for own in zip(*parts, strict=True))
         begin, size, room = (
-            np.array(own, dtype=np.int64)
-            for own in zip(*((own.begin, own.size, _filled(own.size)) for own in self.groups), strict=True)
+            np.array(group, dtype=np.int64)
+            for group in zip(*((group.begin, group.size, _filled(group.size)) for group in self.groups), strict=True)
         )
         return Terms(begin, size, room, np.array(first), places, conjugates, at_blocks)
 

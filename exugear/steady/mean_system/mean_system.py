@@ -414,7 +414,7 @@ def _mean_over_places(
         The stiffness changes as the carrier turns.
     """
     period = max(2.0 * math.pi / abs(planets.waves * planets.ratio) for planets in frame.sets)
-    more = tuple(np.zeros_like(own) for own in here)
+    more = tuple(np.zeros_like(value) for value in here)
     largest = 0.0
     curved = any(element.is_curved for element in frame.assembly.elements)
     most = ROWS_VARIATION if frame.assembly.has_rows or curved else VARIATION

@@ -251,7 +251,7 @@ def coupled(
     mean wave to cosine and sine.
     """
     forward = waves.waves[family.first].sense * math.copysign(1.0, speed) > 0.0
-    cycles = np.array([own[family.first] for own in spectra.values()])
+    cycles = np.array([values[family.first] for values in spectra.values()])
     parts = (_place_coefficients if waves.carriers else _wave_coefficients)(family, cycles, ports, speed)
     if not forward:  # the mesh runs through its cycle backwards, the carrier turns as it does
         parts = parts[:, :, ::-1].conj()

@@ -220,7 +220,9 @@ def ratings_of(section: CatalogueSection) -> LoadRatings:
     elif any(estimate.key in INSIDE for estimate in estimates(section)):
         dynamic_margin, static_margin = margins(section)
         computed = computed[0] / dynamic_margin, computed[1] / static_margin
-    dynamic, static = (own if stated is None else KN * stated for own, stated in zip(computed, given, strict=True))
+    dynamic, static = (
+        rating if stated is None else KN * stated for rating, stated in zip(computed, given, strict=True)
+    )
     if None not in given:
         return LoadRatings(dynamic, static, estimated=False)
     if known is None:

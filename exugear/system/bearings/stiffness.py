@@ -382,7 +382,12 @@ def planet_supports(supports: Sequence[Bearing], planets: Sequence[str], angles:
     """Families of supports that each planet (names) of a set has one of; angles (N,) of the planets, rad."""
     found = []
     for family in sorted({support.family for support in supports if support.body in planets}):
-        numbers = [n for name in planets for n, own in enumerate(supports) if own.body == name and own.family == family]
+        numbers = [
+            n
+            for name in planets
+            for n, support in enumerate(supports)
+            if support.body == name and support.family == family
+        ]
         if len(numbers) == len(planets):
             found.append(PlanetSupports(np.array(numbers, dtype=np.int64), angles))
     return found
@@ -402,17 +407,17 @@ def with_equal_planets(connectors: ConnectorArrays, sets: Iterable[PlanetSupport
     load = connectors.point_load.copy()
     with_rows = np.diff(connectors.rolling.first) > 0
     largest = 0.0
-    for own, angles in sets:
-        if with_rows[own].all() and not connectors.rolling.cage_ratio[own].any():
-            phase[own] = angles + _mean_angle(phase[own] - angles)
+    for members, angles in sets:
+        if with_rows[members].all() and not connectors.rolling.cage_ratio[members].any():
+            phase[members] = angles + _mean_angle(phase[members] - angles)
         turns = np.array([_turn(angle) for angle in angles])
         back = turns.transpose(0, 2, 1)
-        largest = max(largest, _spread(back @ stiffness[own] @ turns))
+        largest = max(largest, _spread(back @ stiffness[members] @ turns))
         for matrices in (stiffness, damping):
-            matrices[own] = turns @ (back @ matrices[own] @ turns).mean(axis=0) @ back
+            matrices[members] = turns @ (back @ matrices[members] @ turns).mean(axis=0) @ back
         for vectors in (strain, load):
-            mean = np.einsum("nij,nj->ni", back, vectors[own]).mean(axis=0)
-            vectors[own] = turns @ mean
+            mean = np.einsum("nij,nj->ni", back, vectors[members]).mean(axis=0)
+            vectors[members] = turns @ mean
     rolling = connectors.rolling._replace(phase=phase)
     equal = connectors._replace(
         stiffness=stiffness, damping=damping, point_strain=strain, point_load=load, rolling=rolling

@@ -90,7 +90,7 @@ class ResultsForExport:
     def loaded(self) -> Assembly | None:
         """The most complete variant with bearings for which results were read."""
         assemblies = [assembly for assembly in self._assemblies.values() if assembly.variant.has_bearings]
-        return max(assemblies, key=lambda one: one.variant.is_elastic, default=None)
+        return max(assemblies, key=lambda choice: choice.variant.is_elastic, default=None)
 
     def _each(self, pattern: str, read: Callable[[Path], tuple[Choice, Result]]) -> Iterator[tuple[Choice, Result]]:
         """Read files one by one; those that do not belong to the gearbox are recorded in `left_out`."""
@@ -396,9 +396,9 @@ def put_displacements(results: Results, assembly: Assembly) -> None:
         nodes = nodes[:: results.sense(number)]
         heights, moved = zip(*nodes, strict=True)
         along = results.sense(number) * (np.array(heights) - results.origins.places[number])
-        own = np.array(moved) @ results.origins.axes[number].T
+        displacements = np.array(moved) @ results.origins.axes[number].T
         results.put(number, "node_positions", along, results.static_case)
-        for axis, column in zip("uvw", own.T, strict=True):
+        for axis, column in zip("uvw", displacements.T, strict=True):
             results.put(number, f"displacement_{axis}", column, results.static_case)
 
 
@@ -537,8 +537,8 @@ def with_results(gearbox: Gearbox, folder: Path, path: str | Path, rules: Rules 
     if stored.loaded is not None:
         put_displacements(results, stored.loaded)
     content = with_additions(path, results.additions)
-    own = sum(addition.name.startswith(OWN) for addition in results.additions)
-    return Exported(content, own, len(results.additions) - own, _replaced(results), tuple(stored.left_out))
+    custom = sum(addition.name.startswith(OWN) for addition in results.additions)
+    return Exported(content, custom, len(results.additions) - custom, _replaced(results), tuple(stored.left_out))
 
 
 def _static_load_case(gearbox: Gearbox, model: Model) -> int | None:

@@ -85,7 +85,7 @@ def sections_of_bodies(
         for shaft in body.parts_of_type("shaft"):
             with notes.errors.gathered():
                 pieces += sections_of(model, places, shaft, body, notes)
-        found[body.name] = sorted(pieces, key=lambda one: one.start)
+        found[body.name] = sorted(pieces, key=lambda cylinder: cylinder.start)
     return found
 
 
@@ -183,14 +183,14 @@ def _has_shape(model: Model, body: RigidGroup, sections: Sequence[Cylinder]) -> 
 
 def _shape(model: Model, body: RigidGroup, sections: Sequence[Cylinder]) -> Block:
     pieces = []
-    for one in sections:
-        piece = {"length_mm": one.length, "outer_diameter_mm": one.outers[0]}
-        if one.inners[0]:
-            piece["inner_diameter_mm"] = one.inners[0]
-        if one.outers[1] != one.outers[0]:
-            piece["outer_diameter_end_mm"] = one.outers[1]
-        if one.inners[1] != one.inners[0]:
-            piece["inner_diameter_end_mm"] = one.inners[1]
+    for cylinder in sections:
+        piece = {"length_mm": cylinder.length, "outer_diameter_mm": cylinder.outers[0]}
+        if cylinder.inners[0]:
+            piece["inner_diameter_mm"] = cylinder.inners[0]
+        if cylinder.outers[1] != cylinder.outers[0]:
+            piece["outer_diameter_end_mm"] = cylinder.outers[1]
+        if cylinder.inners[1] != cylinder.inners[0]:
+            piece["inner_diameter_end_mm"] = cylinder.inners[1]
         pieces.append(piece)
     entries = {
         "start_z_mm": read(sections[0].start, "support_vector of the shaft"),
@@ -500,17 +500,17 @@ def _compare_speeds(gearbox: Gearbox, loads: Sequence[ImportedLoads], ends: Ends
     if gearbox.train.degrees_of_freedom != 1:
         return
     mode = dict(zip(gearbox.spinning, gearbox.train.kinematic_modes[:, 0].tolist(), strict=True))
-    for load in loads:
-        base = load.speeds.get(ends.input)
-        for body, speed in load.speeds.items():
+    for load_case in loads:
+        base = load_case.speeds.get(ends.input)
+        for body, speed in load_case.speeds.items():
             if not base or body == ends.input or body not in mode:
                 continue
             rolls = base * mode[body] / mode[ends.input]
             notes.checked.append(
-                f"{load.name}: {body} rotates at {speed:.6g} rpm, kinematics result in {rolls:.6g} rpm"
+                f"{load_case.name}: {body} rotates at {speed:.6g} rpm, kinematics result in {rolls:.6g} rpm"
             )
             if abs(rolls - speed) > SPEED_TOLERANCE * max(abs(rolls), abs(speed)):
                 notes.errors.append(
-                    f"{load.name}: the file has {body} at {speed:g} rpm, but with {ends.input} at {base:g} rpm the "
-                    f"kinematics result in {rolls:g} rpm"
+                    f"{load_case.name}: the file has {body} at {speed:g} rpm, but with {ends.input} at {base:g} rpm "
+                    f"the kinematics result in {rolls:g} rpm"
                 )

@@ -71,7 +71,7 @@ def entries_of(
         if row.key in entries:
             continue
         found = (part.quantity(row.attribute) for part in parts if part is not None)
-        value = next((row.factor * one for one in found if one or (zeros and one is not None)), None)
+        value = next((row.factor * value for value in found if value or (zeros and value is not None)), None)
         if value is not None and limits[0] <= value <= limits[1]:
             entries[row.key] = read(tidy(value), row.attribute)
     return entries
@@ -158,8 +158,8 @@ def _table(name: str, block: Block) -> Iterator[str]:
 
 
 def _line(key: str, entry: Entry) -> str:
-    if isinstance(entry.value, list) and any(isinstance(one, Mapping) for one in entry.value):
-        rows = "".join(f"    {toml_value(one)},\n" for one in entry.value)
+    if isinstance(entry.value, list) and any(isinstance(row, Mapping) for row in entry.value):
+        rows = "".join(f"    {toml_value(row)},\n" for row in entry.value)
         return f"{_with_comment(f'{key} = [', entry.comment)}\n{rows}]"
     return _with_comment(f"{key} = {toml_value(entry.value)}", entry.comment)
 

@@ -343,7 +343,7 @@ def _placed(section: CatalogueSection, row: RollerRow | BallRow) -> tuple[Rollin
     angle = math.radians(section.contact_angle_deg or 0.0)
     signed = angle if section.locates_towards == "+z" else -angle
     if section.type == "four_point_ball":
-        return tuple(moved(row, each, 0.0) for each in (-angle, angle))
+        return tuple(moved(row, signed, 0.0) for signed in (-angle, angle))
     if section.arrangement != "single":
         distance = si(section, "row_distance_mm")
         preload = si(section, "axial_preload_um")

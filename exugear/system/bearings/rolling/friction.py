@@ -173,9 +173,9 @@ def frictional_moment(
     known = friction_constants(section.type)
     series = friction_series(section)
     n = abs(speed) / RPM
-    each = [_Operation(share, own, mean, n, static_rating / len(axial_loads), factor) for own in axial_loads]
+    operations = [_Operation(share, axial, mean, n, static_rating / len(axial_loads), factor) for axial in axial_loads]
     moments = [
-        sum(_moment(section, known[name], operation, 1e6 * viscosity) for operation in each)
+        sum(_moment(section, known[name], operation, 1e6 * viscosity) for operation in operations)
         for name in known
         if series in ("", name)
     ]

@@ -235,8 +235,8 @@ def viscosity_at(temperature: float, viscosity_40: float, viscosity_100: float) 
     >>> round(viscosity_at(80.0, 220.0, 19.0) * 0.890 * (1.0 - 0.0007 / 0.890 * 65.0), 1)
     30.1
     """
-    double = [math.log10(math.log10(one + _WALTHER)) for one in (viscosity_40, viscosity_100)]
-    place = [math.log10(one + _FREEZING) for one in (40.0, 100.0, temperature)]
+    double = [math.log10(math.log10(viscosity + _WALTHER)) for viscosity in (viscosity_40, viscosity_100)]
+    place = [math.log10(celsius + _FREEZING) for celsius in (40.0, 100.0, temperature)]
     slope = (double[1] - double[0]) / (place[1] - place[0])
     return float(10.0 ** (10.0 ** (double[0] + slope * (place[2] - place[0]))) - _WALTHER)
 
