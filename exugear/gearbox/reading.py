@@ -28,21 +28,27 @@ LONGEST_ERROR = 280
 """Maximum number of characters of an error after the name of the file."""
 
 
-class GearboxFileError(ValueError):
-    """A gearbox file that cannot be used; the message has one line per error with file, key, value and remedy.
+class ListedErrors(ValueError):
+    """Several errors of a file, one line each.
 
     Attributes
     ----------
     errors : tuple of str
-        All errors; the message shows the first `SHOWN_ERRORS`.
+        All errors; the message shows the first ones, at most `shown`.
     """
+
+    shown = SHOWN_ERRORS
 
     def __init__(self, *errors: str) -> None:
         self.errors = tuple(dict.fromkeys(errors))
-        more = len(self.errors) - SHOWN_ERRORS
+        more = len(self.errors) - self.shown
         many = "s" if more > 1 else ""
         rest = [f"and {more} more error{many}"] if more > 0 else []
-        super().__init__("\n".join([*self.errors[:SHOWN_ERRORS], *rest]))
+        super().__init__("\n".join([*self.errors[: self.shown], *rest]))
+
+
+class GearboxFileError(ListedErrors):
+    """A gearbox file that cannot be used; the message has one line per error with file, key, value and remedy."""
 
 
 def error_line(source: str, text: str) -> str:

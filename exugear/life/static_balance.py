@@ -544,7 +544,7 @@ def _wider(
         misalignment=tuple(_rounded(node / width) for node in nodes),
     )
     path = folder / "stress" / f"{request.name}.states.nc"
-    return TableRequest(request.name, wanted, path, _stored(path, wanted))
+    return TableRequest(request.name, wanted, path, stored_table(path, wanted))
 
 
 def _ends(openings: Sequence[float]) -> tuple[float, float]:
@@ -559,7 +559,8 @@ def _nodes(begin: float, end: float) -> list[float]:
     return [begin + (end - begin) * step / steps for step in range(1, steps + 1)]
 
 
-def _stored(path: Path, wanted: TableInput) -> MeshTable | None:
+def stored_table(path: Path, wanted: TableInput) -> MeshTable | None:
+    """Read the table of an input; None if the file is missing, damaged, or of another input."""
     try:
         return MeshTable.open(path, wanted)
     except TableError:

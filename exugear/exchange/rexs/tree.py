@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from exugear.exchange.rexs.mapping import UNITS
+from exugear.gearbox.reading import ListedErrors
 from exugear.gearbox.units import unit_of
 from fe_ste.tools.display import ReprMixin
 
@@ -35,27 +36,14 @@ def unit_factor(unit: str, wanted: str) -> float | None:
 
 # Errors of a REXS file: one clear sentence each, reported together
 
-SHOWN_ERRORS = 20
-"""Maximum number of errors that a message shows."""
 LONGEST_TEXT = 80
 """Maximum number of characters of a file's text in a message or comment."""
 
 
-class RexsError(ValueError):
-    """A REXS file that cannot be read or imported.
+class RexsError(ListedErrors):
+    """A REXS file that cannot be read or imported; the message has one sentence per error."""
 
-    Attributes
-    ----------
-    errors : tuple of str
-        All errors, one sentence each; the message shows the first `SHOWN_ERRORS`.
-    """
-
-    def __init__(self, *errors: str) -> None:
-        self.errors = tuple(dict.fromkeys(errors))
-        more = len(self.errors) - SHOWN_ERRORS
-        many = "s" if more > 1 else ""
-        rest = [f"and {more} more error{many}"] if more > 0 else []
-        super().__init__("\n".join([*self.errors[:SHOWN_ERRORS], *rest]))
+    shown = 20
 
 
 class Errors(list[str]):
