@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from exugear.gearbox.named_files import LARGEST_TABLE
 from exugear.gearbox.parts import Bearing, Body, Coupling, DampingTimes, Joint, LoadCase, PointForce
 from exugear.gearbox.reading import Origin, part_of_each, parts_of_each
-from exugear.gearbox.sections.bodies import BodySection, InertiaSection, ShaftSectionSection
+from exugear.gearbox.sections.bodies import BodySection, InertiaSection
 from exugear.gearbox.sections.case import DampingSection, ForceSection, GearboxFile, LoadCaseSection
 from exugear.gearbox.sections.connections import (
     BearingSection,
@@ -77,33 +77,21 @@ def _family(origin: Origin, family: str, section: BodySection, inertias: str) ->
     angles = [math.radians(angle) for angle in section.planet_angles_deg] or [0.0]
     held = section.carrier is not None and origin.case.bodies[section.carrier].fixed
     for suffix, angle in zip(origin.suffixes(family), angles, strict=True):
-        yield _body(family, suffix, section, inertia, angle, _axis(origin, family, angle), held)
-
-
-def _body(
-    family: str,
-    suffix: str,
-    section: BodySection,
-    inertia: InertiaSection | None,
-    angle: float,
-    axis: tuple[float, float],
-    held: bool,
-) -> Body:
-    return Body(
-        name=family + suffix,
-        family=family,
-        axis=axis,
-        centre_of_mass_z=MM * ((inertia and inertia.centre_of_mass_z_mm) or 0.0),
-        mass=(inertia and inertia.mass_kg) or 0.0,
-        axial=inertia.axial_kg_m2 if inertia else 0.0,
-        transverse=(inertia and inertia.transverse_kg_m2) or 0.0,
-        carrier=None if section.carrier is None or held else section.carrier,
-        orbit_angle=angle if section.carrier else 0.0,
-        spin_only=section.spin_only,
-        fixed=section.fixed,
-        wheels={gear: z * MM for gear, z in section.gears_z_mm.items()},
-        planet_of=section.carrier,
-    )
+        yield Body(
+            name=family + suffix,
+            family=family,
+            axis=_axis(origin, family, angle),
+            centre_of_mass_z=MM * ((inertia and inertia.centre_of_mass_z_mm) or 0.0),
+            mass=(inertia and inertia.mass_kg) or 0.0,
+            axial=inertia.axial_kg_m2 if inertia else 0.0,
+            transverse=(inertia and inertia.transverse_kg_m2) or 0.0,
+            carrier=None if section.carrier is None or held else section.carrier,
+            orbit_angle=angle if section.carrier else 0.0,
+            spin_only=section.spin_only,
+            fixed=section.fixed,
+            wheels={gear: z * MM for gear, z in section.gears_z_mm.items()},
+            planet_of=section.carrier,
+        )
 
 
 def _computed_inertia(origin: Origin, family: str, section: BodySection) -> InertiaSection:
@@ -118,8 +106,17 @@ def _computed_inertia(origin: Origin, family: str, section: BodySection) -> Iner
     if shape is not None:
         start = si(shape, "start_z_mm")
         for piece in shape.sections:
-            tubes.append(_tube(piece, start, shape.material.density_kg_per_m3))
-            start += tubes[-1].length
+            tube = Tube(
+                start=start,
+                length=si(piece, "length_mm"),
+                outer=si(piece, "outer_diameter_mm"),
+                inner=si(piece, "inner_diameter_mm"),
+                density=shape.material.density_kg_per_m3,
+                outer_end=optional_si(piece, "outer_diameter_end_mm"),
+                inner_end=optional_si(piece, "inner_diameter_end_mm"),
+            )
+            tubes.append(tube)
+            start += tube.length
         places = blank_places(origin.case, family)
         for name, blank in shape.blanks.items():
             if name in places:  # faults_of_blanks reports the others
@@ -157,18 +154,6 @@ def blank_places(case: GearboxFile, family: str) -> dict[str, float]:
     if section.shape is not None and section.shape.torque_z_mm is not None:
         places["torque"] = section.shape.torque_z_mm
     return places
-
-
-def _tube(piece: ShaftSectionSection, start: float, density: float) -> Tube:
-    return Tube(
-        start=start,
-        length=si(piece, "length_mm"),
-        outer=si(piece, "outer_diameter_mm"),
-        inner=si(piece, "inner_diameter_mm"),
-        density=density,
-        outer_end=optional_si(piece, "outer_diameter_end_mm"),
-        inner_end=optional_si(piece, "inner_diameter_end_mm"),
-    )
 
 
 def gear_tube(gear: GearSection, z: float, shaft: Sequence[Tube]) -> Tube:

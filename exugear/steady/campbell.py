@@ -231,19 +231,15 @@ class ModeNamer:
             return float(circling / total)
         return 0.0
 
-    def _parts(self, shape: Complexes) -> tuple[tuple[Floats, float], ...]:
-        """Real and imaginary part of a shape with the share of its energy that each has."""
+    def _kinetic(self, shape: Complexes) -> Floats:
+        """Share of kinetic energy (bodies, motions) of the real and imaginary part, weighted by their energy."""
         parts = (shape.real, shape.imag)
         energies = [float(part @ self.system.mass @ part) for part in parts]
-        return tuple(
-            (part, energy / sum(energies)) for part, energy in zip(parts, energies, strict=True) if energy > 0.0
-        )
-
-    def _kinetic(self, shape: Complexes) -> Floats:
-        """Share of kinetic energy (bodies, motions)."""
         shares = np.zeros((len(self.assembly.bodies), len(BODY_MOTIONS)))
-        for part, weight in self._parts(shape):
-            shares += weight * kinetic_shares(self.assembly, (self._turn @ part)[:, None], self._q)[0]
+        for part, energy in zip(parts, energies, strict=True):
+            if energy > 0.0:
+                moved = (self._turn @ part)[:, None]
+                shares += energy / sum(energies) * kinetic_shares(self.assembly, moved, self._q)[0]
         return shares
 
     def _words(self, shape: Complexes, kinetic: Floats) -> str:
@@ -266,28 +262,23 @@ class ModeNamer:
     def _motion_shares(self, planets: PlanetSet, shape: Complexes, kinetic: Floats) -> tuple[float, Floats]:
         """Share of the planets of a set, and shares (3,) of the set by type of motion."""
         places = {body.name: n for n, body in enumerate(self.assembly.bodies)}
-        waves = np.array([self._wave_energy(name, shape) for name in planets.names])
+        # The coordinates of planet n hold multi-blade component n.
+        energies = []
+        for name in planets.names:
+            index = [i for i in self.assembly.coordinates[name] if i >= 0]
+            motion = shape[index]
+            energies.append(float((motion.conj() @ self.system.mass[np.ix_(index, index)] @ motion).real))
+        waves = np.array(energies)
         by_kind = np.array([waves[0], waves[1:3].sum(), waves[3:].sum()])
         of_planets = float(sum(kinetic[places[name]].sum() for name in planets.names))
         shares = of_planets * by_kind / max(float(by_kind.sum()), 1e-300)
-        for name in self._central(planets):
+        meshing = [{element.mesh.pinion, element.mesh.gear} for element in self.assembly.elements]
+        central = {planets.carrier}.union(*(ends for ends in meshing if ends & set(planets.names)))
+        for name in central - set(planets.names):
             if name in places:
                 turning = float(kinetic[places[name], TURNING].sum())
                 shares[:2] += turning, float(kinetic[places[name]].sum()) - turning
         return of_planets, shares
-
-    def _wave_energy(self, slot: str, shape: Complexes) -> float:
-        """Kinetic energy of the multi-blade component in the coordinates of a planet."""
-        index = [i for i in self.assembly.coordinates[slot] if i >= 0]
-        motion = shape[index]
-        return float((motion.conj() @ self.system.mass[np.ix_(index, index)] @ motion).real)
-
-    def _central(self, planets: PlanetSet) -> set[str]:
-        """Bodies that carry the planets or mesh with them."""
-        meshes = (element.mesh for element in self.assembly.elements)
-        ends = [{mesh.pinion, mesh.gear} for mesh in meshes]
-        planet_names = set(planets.names)
-        return {planets.carrier}.union(*(pair for pair in ends if pair & planet_names)) - planet_names
 
 
 def circle(x: complex, y: complex) -> float:

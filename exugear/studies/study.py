@@ -94,7 +94,12 @@ def errors_of_names(study: StudyFile, kept: Mapping[str, Output]) -> Iterator[st
     stepped = any(parameter.kind == "step" for parameter in study.parameters.values())
     if study.optimise is not None:
         taken |= dict.fromkeys(OF_SEARCHES, "the points of an optimisation")
-        taken |= _taken_by_tolerances(study)
+        if study.tolerances:
+            taken[SAMPLE] = "the draws"
+            listed = [name for name, tolerance in study.tolerances.items() if tolerance.paths]
+            taken |= {f"{name}_path": f"the paths of tolerances.{name}" for name in listed}
+            sides = [(name, side) for name in study.outputs for side in ("high", "low")]
+            taken |= {f"{name}_{side}": f"a percentile of outputs.{name}" for name, side in sides}
     elif drawn:
         taken[SAMPLE] = "the draws"
         taken |= {f"{name}_path": f"the paths of parameters.{name}" for name in drawn if study.parameters[name].paths}
@@ -113,19 +118,6 @@ def errors_of_names(study: StudyFile, kept: Mapping[str, Output]) -> Iterator[st
         for name in getattr(study, first):
             if name in getattr(study, second):
                 yield f"{second}.{name}: {first}.{name} has the same name; rename one"
-
-
-def _taken_by_tolerances(study: StudyFile) -> dict[str, str]:
-    """Return the names reserved in the dataset of an optimisation with tolerances."""
-    if not study.tolerances:
-        return {}
-    taken = {
-        f"{name}_path": f"the paths of tolerances.{name}"
-        for name, tolerance in study.tolerances.items()
-        if tolerance.paths
-    }
-    sides = {f"{name}_{side}": f"a percentile of outputs.{name}" for name in study.outputs for side in ("high", "low")}
-    return {SAMPLE: "the draws", **taken, **sides}
 
 
 def errors_of_search(study: StudyFile, kept: Mapping[str, Output]) -> Iterator[str]:
@@ -183,7 +175,7 @@ def errors_of_values(design: Design) -> Iterator[str]:
 
 
 def errors_of_options(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choice) -> Iterator[str]:
-    """Report invalid options of the built-in outputs: out of range, or missing in this gearbox."""
+    """Report invalid options of the built-in outputs: out of range, contradictory, or missing in this gearbox."""
     built_in = {id(quantity) for quantity in QUANTITIES.values()}
     known = _names(gearbox, choice)
     for name, output in kept.items():
@@ -197,19 +189,15 @@ def errors_of_options(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choi
                 yield f"outputs.{name}.{key} = {value!r}: must be finite, and lie between {low:g} and {high:g}"
             elif key in known and value and value not in known[key]:
                 yield f"outputs.{name}.{key} = {str(value)[:200]!r}: no such {key}; there are {_listed(known[key])}"
-        yield from _errors_of_orders(name, output.options, gearbox)
-
-
-def _errors_of_orders(name: str, options: Mapping[str, Any], gearbox: Gearbox) -> Iterator[str]:
-    """Report options that contradict each other, or the positions of the table."""
-    if options.get("from_Hz", 0.0) > options.get("to_Hz", math.inf):
-        yield f"outputs.{name}.from_Hz = {options['from_Hz']:g}: must be below to_Hz = {options['to_Hz']:g}"
-    most = gearbox.ste.positions // 2
-    if options.get("harmonic", 1) > most:
-        yield (
-            f"outputs.{name}.harmonic = {options['harmonic']}: a table of {gearbox.ste.positions} positions has {most}"
-            " harmonics; set a lower harmonic, or more ste.positions"
-        )
+        options = output.options
+        if options.get("from_Hz", 0.0) > options.get("to_Hz", math.inf):
+            yield f"outputs.{name}.from_Hz = {options['from_Hz']:g}: must be below to_Hz = {options['to_Hz']:g}"
+        most = gearbox.ste.positions // 2
+        if options.get("harmonic", 1) > most:
+            yield (
+                f"outputs.{name}.harmonic = {options['harmonic']}: a table of {gearbox.ste.positions} positions has "
+                f"{most} harmonics; set a lower harmonic, or more ste.positions"
+            )
 
 
 def errors_of_needs(study: StudyFile, kept: Mapping[str, Output], gearbox: Gearbox) -> Iterator[str]:

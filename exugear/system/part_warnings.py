@@ -235,22 +235,17 @@ def _faces(gearbox: Gearbox) -> Iterator[str]:
     bodies = gearbox.named_bodies
     reported = set()
     for mesh in gearbox.meshes:
-        places = [
-            bodies[body].wheels.get(gear.name)
-            for body, gear in ((mesh.pinion, mesh.pair.pinion), (mesh.gear, mesh.pair.gear))
-        ]
-        if None in places or mesh.family in reported:
+        pinion, gear = mesh.pair.pinion, mesh.pair.gear
+        if mesh.family in reported:
             continue
-        gears = (mesh.pair.pinion, mesh.pair.gear)
-        low = max(place - 0.5 * gear.face_width for place, gear in zip(places, gears, strict=True) if place is not None)
-        high = min(
-            place + 0.5 * gear.face_width for place, gear in zip(places, gears, strict=True) if place is not None
-        )
+        pinion_z, gear_z = bodies[mesh.pinion].wheels[pinion.name], bodies[mesh.gear].wheels[gear.name]
+        low = max(pinion_z - 0.5 * pinion.face_width, gear_z - 0.5 * gear.face_width)
+        high = min(pinion_z + 0.5 * pinion.face_width, gear_z + 0.5 * gear.face_width)
         if high - low < LEAST_OVERLAP * mesh.pair.face_width:
             reported.add(mesh.family)
             family = bodies[mesh.gear].family
             yield (
-                f"bodies.{family}.gears_z_mm.{gears[1].name} = {1e3 * (places[1] or 0.0):g}: {mesh.family} has "
+                f"bodies.{family}.gears_z_mm.{gear.name} = {1e3 * gear_z:g}: {mesh.family} has "
                 f"{1e3 * max(high - low, 0.0):.4g} mm of its face width in mesh, but {1e3 * mesh.pair.face_width:.4g} "
                 "mm are used; move a gear, or set common_face_width_mm"
             )
@@ -504,12 +499,10 @@ def pair_warnings(gearbox: Gearbox) -> Iterator[str]:
 
 def _clear_tip_diameter(pair: GearPair, mate: Gear) -> float:
     """Tip diameter of a gear, m, that leaves the proposed margin on the other one of its pair."""
-    if mate is pair.gear:
-        other = pair.pinion
-        on_other = other.form_roll_length + PROPOSED_MARGIN * (other.tip_roll_length - other.form_roll_length)
-        roll = on_other + pair.base_tangent_length if mate.internal else pair.base_tangent_length - on_other
-    else:
-        other = pair.gear
-        on_other = other.form_roll_length + PROPOSED_MARGIN * (other.tip_roll_length - other.form_roll_length)
+    other = pair.pinion if mate is pair.gear else pair.gear
+    on_other = other.form_roll_length + PROPOSED_MARGIN * (other.tip_roll_length - other.form_roll_length)
+    if mate is pair.pinion:
         roll = pair.pinion_roll_length(on_other)
+    else:
+        roll = on_other + pair.base_tangent_length if mate.internal else pair.base_tangent_length - on_other
     return 2.0 * math.hypot(mate.base_radius, roll)
