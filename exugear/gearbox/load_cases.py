@@ -182,17 +182,23 @@ def summarise_loads(
     unit = np.array([rolling[name] for name in names])
     axial = _axial_inertias(gearbox, inertias)
     times = _instants(series, total)
-    torques = _torques(names, case, series, times)
+    torques = np.zeros((len(times), len(names)))
+    for name, torque in case.torques.items():
+        torques[:, names.index(name)] += torque
+    for name, (lines, values) in series.items():
+        torques[:, names.index(name)] += np.interp(times, lines, values)
     rates, added = _rates(gearbox, case, axial, torques)
     spins = _speeds(gearbox, case, times, rates)
     speeds = spins[:, names.index(reference)]
     forces = _mesh_forces(gearbox, torques + added - rates * axial)
     fastest = dict(zip(names, np.abs(spins).max(axis=0).tolist(), strict=True))
     flanks, reversed_flanks = _flanks(gearbox, forces)
+    net = float(torques[0] @ unit)
     return LoadSummary(
         name=case.name,
         inertia=float(axial @ unit**2),
-        net_torque=_without_round_off(float(torques[0] @ unit), torques[0] * unit),
+        # Round-off of the torques counts as zero.
+        net_torque=net if abs(net) > UNLOADED * float(np.abs(torques[0] * unit).max(initial=0.0)) else 0.0,
         driven=case.driven_body is not None,
         start_speed=case.start_speed,
         end_speed=float(speeds[-1]),
@@ -205,13 +211,6 @@ def summarise_loads(
         least_shares=_shares(gearbox, forces, min),
         greatest_shares=_shares(gearbox, forces, max),
     )
-
-
-def _without_round_off(total: float, parts: Floats) -> float:
-    """Return a sum, or zero if it is only round-off of its parts."""
-    if abs(total) > UNLOADED * float(np.abs(parts).max(initial=0.0)):
-        return total
-    return 0.0
 
 
 def load_warnings(loads: LoadSummary) -> tuple[str, ...]:
@@ -435,16 +434,6 @@ def _instants(series: Series, total: float) -> Floats:
     lines = np.concatenate([times for times, _ in series.values()])
     inside = lines[(lines > 0.0) & (lines < total)]
     return np.unique(np.concatenate([np.linspace(0.0, total, INSTANTS), inside]))
-
-
-def _torques(names: tuple[str, ...], case: LoadCase, series: Series, times: Floats) -> Floats:
-    """Torques (times, bodies) on the rotating bodies, N m."""
-    torques = np.zeros((len(times), len(names)))
-    for name, torque in case.torques.items():
-        torques[:, names.index(name)] += torque
-    for name, (lines, values) in series.items():
-        torques[:, names.index(name)] += np.interp(times, lines, values)
-    return torques
 
 
 def _rates(gearbox: Gearbox, case: LoadCase, axial: Floats, torques: Floats) -> tuple[Floats, Floats]:

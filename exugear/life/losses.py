@@ -355,17 +355,10 @@ def _bearing_losses(
             moments = np.full(3, moment)
         else:
             series = friction_series(section)
-            moments = sum(
-                (
-                    np.array(
-                        frictional_moment(
-                            section, duty.radial_load, duty.axial_load, relative, viscosity, duty.ratings.static
-                        )
-                    )
-                    for duty in members
-                ),
-                np.zeros(3),
-            )
+            moments = np.zeros(3)
+            for duty in members:
+                load = (duty.radial_load, duty.axial_load)
+                moments += frictional_moment(section, *load, relative, viscosity, duty.ratings.static)
         loss, low, high = (moments * relative).tolist()
         largest = max(map(_equivalent_load, members))
         ratio = largest / members[0].ratings.dynamic

@@ -187,11 +187,14 @@ def static_balance(
     linear = is_linear(assembly)
     sizes = np.zeros(5) if hub is None else hub
     solved = _torques(torques, linear)
-    turns = _angles(assembly, angles)
+    places = angles if _carrier(assembly) else 1
+    turns: Floats = np.asarray(2.0 * math.pi / places * np.arange(places))
     wrenches = _wrenches(assembly, body, sizes)
     found: list[States] = []
+    total = len(turns) * len(solved)
+    report = progress or (lambda done, total: None)
     for number, turn in enumerate(turns):
-        count = partial(_report_progress, progress, number * len(solved), len(turns) * len(solved))
+        count = partial(lambda before, done: report(before + done, total), number * len(solved))
         states = None if store is None else store.stored(number)
         if states is None:
             states = _solve_angle(assembly, body, solved, float(turn), wrenches, count)
@@ -203,11 +206,6 @@ def static_balance(
     left = np.any([states.outside for states in found], axis=(0, 1, 2))
     outside = tuple(np.array(assembly.mesh_names)[left].tolist())
     return StaticBalance(solved, turns, force, misalignment, load, tilt, linear, outside)
-
-
-def _report_progress(progress: Callable[[int, int], None] | None, before: int, total: int, done: int) -> None:
-    if progress is not None:
-        progress(before + done, total)
 
 
 def _solve_angle(
@@ -227,25 +225,20 @@ def _solve_angle(
         count(done)
         torque = float(torques[t])
         known = before[math.copysign(1.0, torque)]  # a torque of opposite sign loads other flanks
-        q = _static_coordinates(assembly, body, torque, about, None, _ahead(known, torque))
+        near = known[-1][1] if known else None
+        if len(known) > 1:  # extrapolate the last two states
+            (first, q_first), (second, q_second) = known[-2:]
+            near = q_second + (q_second - q_first) * (torque - second) / (second - first)
+        q = _static_coordinates(assembly, body, torque, about, None, near)
         alone = States.of(assembly, q)
-        beside = (
-            None if wrench is None else _static_coordinates(assembly, body, torque, about, wrench, q)
-            for wrench in wrenches
-        )
-        rows[t] = [alone, *(alone if one is None else States.of(assembly, one) for one in beside)]
+        rows[t] = [alone]
+        for wrench in wrenches:
+            if wrench is None:
+                rows[t].append(alone)
+            else:
+                rows[t].append(States.of(assembly, _static_coordinates(assembly, body, torque, about, wrench, q)))
         known.append((torque, q))
-    return States(*(np.array([[one[key] for one in row] for row in rows]) for key in range(len(States._fields))))
-
-
-def _ahead(known: Sequence[tuple[float, Floats]], torque: float) -> Floats | None:
-    """Return start coordinates for a torque: extrapolated from the last two states, or the last state."""
-    if len(known) < 2:
-        if known:
-            return known[-1][1]
-        return None
-    (first, one), (second, other) = known[-2:]
-    return np.asarray(other + (other - one) * (torque - second) / (second - first))
+    return States(*(np.array([[state[key] for state in row] for row in rows]) for key in range(len(States._fields))))
 
 
 def _static_coordinates(
@@ -314,12 +307,6 @@ def _carrier(assembly: Assembly) -> str | None:
     bodies = assembly.gearbox.named_bodies
     carriers = [body.carrier for body in bodies.values() if body.carrier is not None]
     return next((name for name in carriers if not bodies[name].fixed), None)
-
-
-def _angles(assembly: Assembly, count: int) -> Floats:
-    if _carrier(assembly) is None:
-        return np.zeros(1)
-    return np.asarray(2.0 * math.pi / count * np.arange(count))
 
 
 def _inner_rings(assembly: Assembly, q: Floats) -> tuple[Floats, Floats]:

@@ -90,7 +90,9 @@ def assemble(
     rigid = [body for body in moving if body.name not in flexible]
     six = [body for body in rigid if not (variant.spins_only or body.spin_only)]
     alone = [body for body in rigid if body not in six]
-    coordinates = _coordinates(six, alone)
+    # Indices of the six coordinates of each body; -1 for all but the spin of a body that only turns.
+    coordinates = {body.name: tuple(range(6 * n, 6 * n + 6)) for n, body in enumerate(six)}
+    coordinates |= {body.name: (-1, -1, -1, -1, -1, 6 * len(six) + n) for n, body in enumerate(alone)}
     nodes = {body.name: node_position(body) for body in moving}
     size = 6 * len(six) + len(alone)
     for name, shaft in flexible.items():
@@ -247,14 +249,6 @@ def elastic_arrays(flexible: Mapping[str, ElasticBody], size: int, damping_time:
         gyroscopic=flat["gyroscopic"],
         damping_time=np.full(len(blocks), damping_time),
     )
-
-
-def _coordinates(six: list[Body], alone: list[Body]) -> dict[str, tuple[int, ...]]:
-    """Six state indices of each moving body; -1 for all but the spin where a body has nothing else."""
-    found = {body.name: tuple(range(6 * n, 6 * n + 6)) for n, body in enumerate(six)}
-    for n, body in enumerate(alone):
-        found[body.name] = (-1, -1, -1, -1, -1, 6 * len(six) + n)
-    return found
 
 
 def _inertia(variant: Variant, six: list[Body], alone: list[Body]) -> InertiaArrays:

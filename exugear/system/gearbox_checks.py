@@ -155,9 +155,12 @@ def check_parts(gearbox: Gearbox) -> None:
     families = {bearing.family: bearing for bearing in gearbox.bearings}
     attempts: list[Callable[[], object]] = [partial(_build_bearing, gearbox, bearing) for bearing in families.values()]
     attempts += [partial(_place_teeth, gearbox), partial(_count_states, gearbox)]
-    attempts += [partial(gearbox.table_distances, name) for name in _pairs_with_axes(gearbox)]
+    if gearbox.ste.centre_distance_offsets_um is not None:
+        at_work = {mesh.pair.name for mesh in gearbox.meshes}
+        tabled = [name for name, section in gearbox.case.pairs.items() if section.table or name in at_work]
+        attempts += [partial(gearbox.table_distances, name) for name in tabled]
     attempts += [partial(torque_series, gearbox, case) for case in gearbox.load_cases.values()]
-    attempts += [partial(_build_elastic_body, gearbox, name) for name in elastic_names(gearbox)]
+    attempts += [partial(check_elastic_body, gearbox, name) for name in elastic_names(gearbox)]
     elastic = {gearbox.body(name).family for name in elastic_names(gearbox)}
     attempts += [partial(check_shape, gearbox, name) for name in gearbox.case.bodies if name not in elastic]
     errors: list[str] = []
@@ -211,7 +214,7 @@ def _misfits(gearbox: Gearbox, variant: Variant) -> str:
     """Return the first error of `check_parts` about flexible bodies: an impossible body, or a seat off the body."""
     for name in elastic_names(gearbox) if variant.is_elastic else ():
         try:
-            _build_elastic_body(gearbox, name)
+            check_elastic_body(gearbox, name)
         except GearboxFileError as error:
             return error.errors[0].removeprefix(f"{gearbox.source}: ")
     return ""
@@ -242,14 +245,10 @@ def gearbox_warnings(gearbox: Gearbox) -> tuple[str, ...]:
         )
     lines += pair_warnings(gearbox)
     lines += part_warnings(gearbox)
-    lines += _narrowed_seats(gearbox)
-    return tuple(dict.fromkeys(lines))
-
-
-def _narrowed_seats(gearbox: Gearbox) -> Iterator[str]:
     for name in elastic_names(gearbox):
         if gearbox.case.bodies[gearbox.body(name).family].solid is None:
-            yield from narrowed_seats(gearbox, name)
+            lines += narrowed_seats(gearbox, name)
+    return tuple(dict.fromkeys(lines))
 
 
 def _build_bearing(gearbox: Gearbox, bearing: Bearing) -> None:
@@ -276,15 +275,3 @@ def _count_states(gearbox: Gearbox) -> None:
     states *= len(axes.misalignment_um or _FOLLOWING)
     if states > MOST_STATES:
         raise gearbox.error(f"ste: the axes result in {states} table states; at most {MOST_STATES} are permitted")
-
-
-def _pairs_with_axes(gearbox: Gearbox) -> list[str]:
-    """Pairs whose tables go over centre distances; none where nobody asked for these."""
-    if gearbox.ste.centre_distance_offsets_um is None:
-        return []
-    at_work = {mesh.pair.name for mesh in gearbox.meshes}
-    return [name for name, section in gearbox.case.pairs.items() if section.table or name in at_work]
-
-
-def _build_elastic_body(gearbox: Gearbox, name: str) -> None:
-    check_elastic_body(gearbox, name)

@@ -241,7 +241,9 @@ def _states(
     """State at the angles zero, from a state that is near it; those over the turn of carriers with unequal planets."""
     here = _state(assembly, laws, _balance(assembly, laws, near=near))
     over_turns: dict[str, list[_SupportState]] = {}
-    for carrier in sorted({planets[0].carrier or "" for planets in _unequal(assembly)}):
+    equal = _equal(assembly)
+    unequal = [planets for planets in planet_families(assembly.bodies) if planets not in equal]
+    for carrier in sorted({planets[0].carrier or "" for planets in unequal}):
         over_turns[carrier] = [here]
         for turn in 2.0 * math.pi / CARRIER_ANGLES * np.arange(1, CARRIER_ANGLES):
             about = rolled_coordinates(assembly, carrier, float(turn))
@@ -276,11 +278,6 @@ def _equal(assembly: Assembly) -> list[list[Body]]:
     if assembly.gearbox.pin_offsets:
         return []
     return [planets for planets in planet_families(assembly.bodies) if equally_spaced(planets)]
-
-
-def _unequal(assembly: Assembly) -> list[list[Body]]:
-    equal = _equal(assembly)
-    return [planets for planets in planet_families(assembly.bodies) if planets not in equal]
 
 
 def _equal_supports(assembly: Assembly) -> list[PlanetSupports]:
