@@ -142,8 +142,8 @@ class _RatedBearing:
             by_reference = np.sum(share / (1e6 * _interpolated(lives, radial)), axis=1)
         reference = float(by_reference.sum())
         static = max(
-            equivalent_static_load(rows, section.type, math.hypot(one[0], one[1]), abs(one[2]))
-            for one in worst.reshape(-1, 6)
+            equivalent_static_load(rows, section.type, math.hypot(load[0], load[1]), abs(load[2]))
+            for load in worst.reshape(-1, 6)
         )
         largest = float(np.hypot(worst[..., 0], worst[..., 1]).max())
         least = minimum_load(ratings.dynamic, section.type)

@@ -321,7 +321,7 @@ def compute_life(
         families.setdefault(mesh.family, []).append(number)
     hub = np.concatenate([acting.points.other, acting.worst_hub])
     sharing = {family: balance.load_sharing(numbers, acting.torques, hub) for family, numbers in families.items()}
-    told = {name: one for name, one in sharing.items() if len(families[name]) > 1 or one > TOLD_SHARING}
+    told = {name: value for name, value in sharing.items() if len(families[name]) > 1 or value > TOLD_SHARING}
     return Life(
         variant=str(assembly.variant),
         mesh_model=assembly.mesh_model,
@@ -428,7 +428,8 @@ def _oil_in_words(oil: LubricantSection | None) -> str:
 def _dynamic_in_words(rating: RatingSection, dynamic: Mapping[str, DynamicFactor], acting: ActingLoads) -> str:
     if rating.dynamic_factor is not None:
         return f"K_v = {rating.dynamic_factor:g} for all meshes, as specified"
-    values = ", ".join(f"{name} {one.largest(acting.slowest, acting.fastest):.3f}" for name, one in dynamic.items())
+    factors = {name: factor.largest(acting.slowest, acting.fastest) for name, factor in dynamic.items()}
+    values = ", ".join(f"{name} {value:.3f}" for name, value in factors.items())
     first = next(iter(dynamic.values()))
     lowest = acting.slowest / RPM
     highest = acting.fastest / RPM

@@ -272,13 +272,9 @@ def _check(assembly: Assembly) -> None:
             "pins: position errors cause unequal planet loads that rotate with the carrier, which the steady-state "
             "response cannot treat; remove them, or use `exugear run`"
         )
-    _check_rows(assembly)
-
-
-def _check_rows(assembly: Assembly) -> None:
-    """Refuse rows of rolling elements that pass, or that turn against the load that they carry."""
+    # Rows of rolling elements must neither pass nor turn against the load that they carry.
     rolling = assembly.connectors.rolling
-    bodies = {body.name: body for body in assembly.gearbox.bodies()}
+    bodies = {body.name: body for body in gearbox.bodies()}
     for n in np.flatnonzero(np.diff(rolling.first)):
         support = assembly.supports[n]
         if rolling.cage_ratio[n]:
@@ -349,7 +345,7 @@ def _mass(frame: RotatingFrame, psi: float, u: Floats) -> Floats:
     t = frame.matrices(psi)[0]
     q, v, a = frame.state(psi, 0.0, u)
     still = assembly.inertia_forces(q, v, a)
-    columns = [assembly.inertia_forces(q, v, a + own) - still for own in t.T]
+    columns = [assembly.inertia_forces(q, v, a + unit) - still for unit in t.T]
     return np.asarray(t.T @ np.array(columns).T)
 
 
@@ -357,7 +353,7 @@ def _residuals(frame: RotatingFrame, psi: float, speed: float, u: Floats, du: Fl
     """Return `_residual` at several coordinates and velocities (n, size) at once: bearings have much in common."""
     assembly = frame.assembly
     t = frame.matrices(psi)[0]
-    states = [frame.state(psi, speed, own, None if du is None else du[n]) for n, own in enumerate(u)]
+    states = [frame.state(psi, speed, place, None if du is None else du[n]) for n, place in enumerate(u)]
     q, v, _ = (np.array(values) for values in zip(*states, strict=True))
     needed = np.array([assembly.inertia_forces(*state) for state in states])
     return np.asarray((needed - assembly.forces(q, v, frame.mean_meshes)) @ t)
@@ -421,8 +417,8 @@ def _mean_over_places(
     for psi in period * np.arange(1, PLACES) / PLACES:
         there = (_mass(frame, float(psi), u), *tangents(frame, float(psi), speed, u))
         largest = max(largest, _checked_change(here[2], there[2], most))
-        for mean, one, other in zip(more, here, there, strict=True):
-            mean += (other - one) / PLACES
+        for mean, value, other in zip(more, here, there, strict=True):
+            mean += (other - value) / PLACES
     return more, largest
 
 
