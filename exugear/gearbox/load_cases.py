@@ -190,7 +190,10 @@ def summarise_loads(
     rates, added = _rates(gearbox, case, axial, torques)
     spins = _speeds(gearbox, case, times, rates)
     speeds = spins[:, names.index(reference)]
-    forces = _mesh_forces(gearbox, torques + added - rates * axial)
+    # Mesh forces F_bt (times, meshes) for balanced torques; of minimum norm if meshes share.
+    balanced = torques + added - rates * axial
+    solved = np.linalg.lstsq(gearbox.train.spin_rows.T, balanced.T, rcond=1e-12)[0]
+    forces: Floats = np.asarray(solved[: len(gearbox.meshes)].T)
     fastest = dict(zip(names, np.abs(spins).max(axis=0).tolist(), strict=True))
     flanks, reversed_flanks = _flanks(gearbox, forces)
     net = float(torques[0] @ unit)
@@ -489,12 +492,6 @@ def drive_rate(gearbox: Gearbox, case: LoadCase) -> float:
 def driven_start_speed(gearbox: Gearbox, case: LoadCase) -> float:
     """Speed of the driven body at the start, rad/s; the load case specifies it at the overall input."""
     return gearbox.start_speeds(case)[str(case.driven_body)]
-
-
-def _mesh_forces(gearbox: Gearbox, applied: Floats) -> Floats:
-    """Mesh forces F_bt (times, meshes) for balanced torques (times, bodies); of minimum norm if meshes share."""
-    forces = np.linalg.lstsq(gearbox.train.spin_rows.T, applied.T, rcond=1e-12)[0]
-    return np.asarray(forces[: len(gearbox.meshes)].T)
 
 
 def _flanks(gearbox: Gearbox, forces: Floats) -> tuple[dict[str, str], tuple[str, ...]]:

@@ -15,6 +15,7 @@ stops a run silently.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -110,14 +111,11 @@ class ExudynSystem:
             for joint in self.assembly.gearbox.joints:
                 add_joint(parts, joint)
         if parts.floating is not None:
-            parts.floating.add_forces(self.mbs, parts.all_nodes, meshes, self._applied)
+            parts.floating.add_forces(self.mbs, parts.all_nodes, meshes, partial(self.loads.generalized, self.assembly))
         elif meshes is not None and mesh_route == "element":
             add_mesh_element(parts, meshes)
         elif meshes is not None:
             add_mesh_loads(parts, meshes)
-
-    def _applied(self, t: float, q: Floats, v: Floats) -> Floats:
-        return self.loads.generalized(self.assembly, t, q, v)
 
     def _coordinate_order(self) -> Integers:
         """Position in Exudyn's coordinate vector of each coordinate of the assembly."""
