@@ -35,7 +35,7 @@ from exugear.steady.mean_system.sampled_laws import (
     widened,
 )
 from exugear.steady.response import Response, rates_of
-from exugear.system.statics import RIGID_BODY_LIMIT
+from exugear.system.modes import fastest_growth, state_matrix
 from fe_ste.tools.arrays import Complexes, Floats, Integers
 
 BALANCED = 1e-8
@@ -564,7 +564,6 @@ def growth_at(balance: HarmonicResidual, readings: Complexes, base: int, least: 
     values = system.eigenvalues(speed)
     kicks = max(kicks_needed(float(np.abs(values).max()) / 2.0 / np.pi, period), least)
     varying = balance.tangents_along(readings, base, kicks)
-    lower = np.linalg.solve(system.mass, np.hstack([-system.stiffness_at(speed), -system.damping_at(speed)]))
     pushes = np.vstack(
         [np.zeros((size, varying.shape[1])), np.linalg.solve(system.mass, model.loads(ports))],
     )
@@ -578,7 +577,7 @@ def growth_at(balance: HarmonicResidual, readings: Complexes, base: int, least: 
     of_base[: len(model.waves.waves)] = [wave.base == base for wave in model.waves.waves]
     pushed = np.repeat(of_base, ports.forces.shape[1])
     read = np.tile(np.repeat(of_base, ports.readings.shape[1]), 2)
-    constant = np.vstack([np.eye(size, 2 * size, size), lower])
+    constant = state_matrix(system.mass, system.damping_at(speed), system.stiffness_at(speed))
     constant -= pushes[:, ~pushed] @ varying[0][np.ix_(~pushed, ~read)] @ reads[~read]
     # Many slopes are zero: what nothing pushes along or reads costs nothing then.
     pushed = pushed & varying.any(axis=(0, 2))
@@ -611,9 +610,4 @@ def growth_of_state(balance: HarmonicResidual, readings: Complexes, parted: bool
 
 def mean_growth(model: HarmonicBalanceModel) -> float:
     """Largest growth rate of the averaged system over its speeds, 1/s; free rotation excluded."""
-    rates = []
-    for speed in model.system.speeds:
-        values = model.system.eigenvalues(float(speed))
-        elastic = np.abs(values.imag) > 2.0 * np.pi * RIGID_BODY_LIMIT
-        rates.append(float(values.real[elastic].max(initial=-np.inf)))
-    return max(rates)
+    return max(fastest_growth(model.system.eigenvalues(float(speed))) for speed in model.system.speeds)

@@ -29,7 +29,7 @@ from exugear.system.statics import RIGID_BODY_LIMIT, Linearised, linearise, mesh
 from exugear.system.system import Assembly, input_hash
 from exugear.system.tooth_mesh.element import Angles, MeshData
 from exugear.system.tooth_mesh.laws.registry import LAWS
-from fe_ste.tools.arrays import Booleans, Floats
+from fe_ste.tools.arrays import Booleans, Complexes, Floats
 from fe_ste.tools.display import ReprMixin, TitledRows
 from fe_ste.tools.drawing import axes_or_new
 from fe_ste.tools.stores import Layout, Store, load_dataset, write_dataset
@@ -616,8 +616,18 @@ def undamped_modes(mass: Floats, stiffness: Floats, motions: Floats | None = Non
 
 def growth_rate(linear: Linearised) -> float:
     """Largest real part of the eigenvalues of M x'' + D x' + K x = 0, 1/s, the free rotation left out."""
-    size = len(linear.mass)
-    lower = np.linalg.solve(linear.mass, np.hstack([-linear.total_stiffness, -linear.total_damping]))
-    values = scipy.linalg.eigvals(np.vstack([np.eye(size, 2 * size, size), lower]))
-    elastic = np.abs(values.imag) > 2.0 * np.pi * RIGID_BODY_LIMIT
-    return float(values.real[elastic].max(initial=-np.inf))
+    matrix = state_matrix(linear.mass, linear.total_damping, linear.total_stiffness)
+    return fastest_growth(np.asarray(scipy.linalg.eigvals(matrix), dtype=np.complex128))
+
+
+def state_matrix(mass: Floats, damping: Floats, stiffness: Floats) -> Floats:
+    """Matrix A (2 size, 2 size) of M x'' + D x' + K x = 0 as y' = A y with y = (x, x')."""
+    size = len(mass)
+    lower = np.linalg.solve(mass, np.hstack([-stiffness, -damping]))
+    return np.vstack([np.eye(size, 2 * size, size), lower])
+
+
+def fastest_growth(eigenvalues: Complexes) -> float:
+    """Largest real part of eigenvalues (1/s) without the free rotation; minus infinity if there are no others."""
+    elastic = np.abs(eigenvalues.imag) > 2.0 * np.pi * RIGID_BODY_LIMIT
+    return float(eigenvalues.real[elastic].max(initial=-np.inf))

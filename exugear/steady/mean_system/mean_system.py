@@ -23,6 +23,7 @@ from exugear.gearbox.parts import Mesh
 from exugear.steady.harmonics.linear_solvers import Elimination, elimination, solve_side_by_side
 from exugear.steady.mean_system.rotating_frame import PlanetSet, RotatingFrame, SteadyError, planet_sets
 from exugear.system.bearings.stiffness import load_stands_still, planet_supports, with_equal_planets
+from exugear.system.modes import state_matrix
 from exugear.system.statics import RIGID_BODY_LIMIT, BalanceError, static_state
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Complexes, Floats
@@ -163,9 +164,8 @@ class MeanSystem(ReprMixin):
 
     def eigenvalues(self, speed: float) -> Complexes:
         """Eigenvalues of the averaged system at a speed of the input, 1/s; free rotation among them."""
-        n = self.size
-        lower = np.linalg.solve(self.mass, np.hstack([-self.stiffness_at(speed), -self.damping_at(speed)]))
-        return np.asarray(scipy.linalg.eigvals(np.vstack([np.eye(n, 2 * n, n), lower])))
+        matrix = state_matrix(self.mass, self.damping_at(speed), self.stiffness_at(speed))
+        return np.asarray(scipy.linalg.eigvals(matrix))
 
 
 def mean_system(assembly: Assembly, speeds: Floats) -> MeanSystem:
@@ -458,9 +458,7 @@ def vibrations(mass: Floats, damping: Floats, stiffness: Floats) -> tuple[Comple
     >>> values.imag.round(6)
     array([10., 20.])
     """
-    n = len(mass)
-    lower = np.linalg.solve(mass, np.hstack([-stiffness, -damping]))
-    found: Any = scipy.linalg.eig(np.vstack([np.eye(n, 2 * n, n), lower]), left=True, right=True)
+    found: Any = scipy.linalg.eig(state_matrix(mass, damping, stiffness), left=True, right=True)
     values, left, right = found
     kept = values.imag > 2.0 * np.pi * RIGID_BODY_LIMIT
     kept &= np.abs(values.imag) > np.abs(values.real)
