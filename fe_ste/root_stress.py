@@ -152,8 +152,8 @@ class RootGauges(ReprMixin, line=" of {gear.name!r}: {places.edges!n} edges, {ax
 
     def node_loads(self, roll: Floats, axial: Floats, force: Floats) -> Floats:
         """Share forces (N) at places of a flank among its nodes, bilinear, (f l,); places off the flank at its edge."""
-        first, along = _interval(self.roll, roll)
-        layer, across = _interval(self.axial, axial)
+        first, along = _place(self.roll, roll)
+        layer, across = _place(self.axial, axial)
         loads = np.zeros((len(self.roll), len(self.axial)))
         for step, share in ((0, 1.0 - along), (1, along)):
             for up, width in ((0, 1.0 - across), (1, across)):
@@ -177,13 +177,6 @@ class RootGauges(ReprMixin, line=" of {gear.name!r}: {places.edges!n} edges, {ax
         mean = 0.5 * (total[:, :, 0] + total[:, :, 1])
         radius = np.hypot(0.5 * (total[:, :, 0] - total[:, :, 1]), total[:, :, 2])
         return mean + radius, mean - radius
-
-
-def _interval(grid: Floats, values: Floats) -> tuple[np.ndarray, Floats]:
-    """Interval of a rising grid and the place in it, from 0 to 1."""
-    at = np.clip(values, grid[0], grid[-1])
-    first = np.clip(np.searchsorted(grid, at, side="right") - 1, 0, len(grid) - 2)
-    return first, (at - grid[first]) / (grid[first + 1] - grid[first])
 
 
 def root_gauges(gear: Gear, side: int, settings: MeshSettings | None = None) -> RootGauges:

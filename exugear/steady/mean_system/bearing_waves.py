@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from exugear.steady.mean_system.mean_system import PLACE_STEP, PLACES, RATE_STEP, MeanSystem
-from exugear.steady.mean_system.mesh_places import POSITION, MeshInterface, MeshPlaces, wave_shapes
+from exugear.steady.mean_system.mesh_places import POSITION, MeshInterface, MeshPlaces, among_waves, wave_shapes
 from exugear.steady.mean_system.mesh_waves import WAVES, MeshWaves, wave_name
 from exugear.steady.mean_system.rotating_frame import PlanetSet, SteadyError
 from exugear.steady.mean_system.sampled_laws import sample_rolling
@@ -281,14 +281,9 @@ def places_with_bearings(
         turning = planets is not None and planets.carrier in bearings.carriers
         column = meshes + bearings.carriers.index(planets.carrier) if planets and turning else None
         shapes = wave_shapes(planets, speed, None if column is None else angles[:, column])
-        own = slice(count + n, count + n + shapes.shape[-1])
-        rows = np.zeros((*shapes.shape[:-1], total))
-        columns = np.zeros((*shapes.shape[:-2], total, shapes.shape[-2]))
-        rows[..., own] = shapes
-        columns[..., own, :] = np.swapaxes(shapes / (shapes**2).sum(axis=-2, keepdims=True), -1, -2)
-        samples = places.there.shape[:-2]
-        there.append(np.broadcast_to(rows, (*samples, *rows.shape[-2:])))
-        back.append(np.broadcast_to(columns, (*samples, *columns.shape[-2:])))
+        rows, columns = among_waves(shapes, count + n, total, places.there.shape[:-2])
+        there.append(rows)
+        back.append(columns)
         means += [count + n] * shapes.shape[-2]
     return MeshPlaces(
         tuple(means),

@@ -71,18 +71,13 @@ def mesh_places(waves: MeshWaves, speed: float, positions: Floats, angles: Float
         if wave.wave != 0:
             continue
         planets = waves.planets(wave)
-        own = slice(first, first + sum(other.first == wave.first for other in waves.waves))
         sense = math.copysign(1.0, speed) * wave.sense
         position = positions[first] + sense * angles[:, [wave.base]] / (2.0 * math.pi)
         column = len(waves.base_orders) + carriers.index(planets.carrier) if planets and wave.ahead else None
         shapes = wave_shapes(planets, speed, None if column is None else angles[:, column])
-        rows = np.zeros((*shapes.shape[:-1], count))
-        columns = np.zeros((*shapes.shape[:-2], count, shapes.shape[-2]))
-        rows[..., own] = shapes
-        columns[..., own, :] = np.swapaxes(shapes / (shapes**2).sum(axis=-2, keepdims=True), -1, -2)
-        samples = (len(angles),) if turning else ()
-        there.append(np.broadcast_to(rows, (*samples, *rows.shape[-2:])))
-        back.append(np.broadcast_to(columns, (*samples, *columns.shape[-2:])))
+        rows, columns = among_waves(shapes, first, count, (len(angles),) if turning else ())
+        there.append(rows)
+        back.append(columns)
         means += [first] * shapes.shape[-2]
         at.append(position + np.array(wave.ahead or np.zeros(shapes.shape[-2])))
     return MeshPlaces(
@@ -105,6 +100,24 @@ def wave_shapes(planets: PlanetSet | None, speed: float, turned: Floats | None) 
         return planets.values(math.copysign(1.0, speed * planets.ratio) * turned)
     theta = 2.0 * np.pi * np.arange(TURNED) / TURNED
     return np.stack([np.ones_like(theta), np.cos(theta), np.sin(theta)], axis=1)
+
+
+def among_waves(shapes: Floats, first: int, count: int, samples: tuple[int, ...]) -> tuple[Floats, Floats]:
+    """Values in places p by those of all `count` waves (..., p, count), and back, for some waves from `first` on.
+
+    Parameters
+    ----------
+    shapes : (..., p, waves) of these waves in the places
+    samples : shape of the samples over which the shapes turn; empty if they are constant
+    """
+    waves = slice(first, first + shapes.shape[-1])
+    rows = np.zeros((*shapes.shape[:-1], count))
+    columns = np.zeros((*shapes.shape[:-2], count, shapes.shape[-2]))
+    rows[..., waves] = shapes
+    columns[..., waves, :] = np.swapaxes(shapes / (shapes**2).sum(axis=-2, keepdims=True), -1, -2)
+    return np.broadcast_to(rows, (*samples, *rows.shape[-2:])), np.broadcast_to(
+        columns, (*samples, *columns.shape[-2:])
+    )
 
 
 DEFLECTION, MISALIGNMENT, POSITION = 0, 1, -1
