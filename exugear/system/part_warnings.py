@@ -16,9 +16,9 @@ from exugear.gearbox.gear_parts import thinning_range
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import operating_range, summarise_loads
 from exugear.gearbox.parts import Bearing, Body, PairSpec
-from exugear.gearbox.sections.connections import CatalogueSection
 from exugear.gearbox.sections.designations import boundary_of
 from exugear.gearbox.units import MM, RPM, si
+from exugear.system.bodies.of_gearbox import seat_width
 from fe_ste.geometry.checks import USUAL_TIP_THICKNESS
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.standards.pitting import nominal_contact_stress
@@ -317,17 +317,12 @@ def _clash(gear: Gear, place: float, bearing: Bearing) -> float:
     catalogue = bearing.catalogue
     if catalogue is None:
         return 0.0
-    along = 0.5 * (gear.face_width + _width(catalogue)) - abs(place - bearing.position[2])
+    along = 0.5 * (gear.face_width + seat_width(bearing)) - abs(place - bearing.position[2])
     inside, outside = sorted((0.5 * gear.held_diameter, gear.tip_radius))
     across = min(outside, 0.5e-3 * catalogue.outer_diameter_mm) - max(inside, 0.5e-3 * catalogue.bore_mm)
     if across > LEAST_CLASH and along > CLASHING_SHARE * MM * catalogue.width_mm:
         return along
     return 0.0
-
-
-def _width(catalogue: CatalogueSection) -> float:
-    """Width of a bearing with all its rows, m."""
-    return (1 if catalogue.arrangement == "single" else 2) * si(catalogue, "width_mm")
 
 
 # Margins of gear pairs: form circles, tips, pressure at the pitch point

@@ -70,7 +70,7 @@ def seat_width(bearing: Bearing) -> float:
     if bearing.catalogue is None:
         return 0.0
     rows = 1 if bearing.catalogue.arrangement == "single" else 2
-    return rows * bearing.catalogue.width_mm * MM
+    return rows * si(bearing.catalogue, "width_mm")
 
 
 def frame_of(gearbox: Gearbox, body: Body) -> Frame:
@@ -533,8 +533,7 @@ def check_elastic_body(gearbox: Gearbox, name: str) -> None:
     if not model.seats:
         raise gearbox.error(f"bodies.{family}.shape: the body has no seat; add a gear, a bearing or torque_z_mm")
     try:
-        start = MM * _shape_of(gearbox, gearbox.body(name)).start_z_mm
-        check_shaft(model.sections, model.seats, start=start)
+        check_shaft(model.sections, model.seats, start=si(_shape_of(gearbox, gearbox.body(name)), "start_z_mm"))
     except ShaftError as error:
         raise gearbox.error(f"bodies.{family}.shape: {error}") from None
 
@@ -574,12 +573,8 @@ class _Hashed:
 def _reduced(hashed: _Hashed, folder: Path | None) -> ReducedBody:
     model = hashed.model
     if isinstance(model, SolidModel):
-        if folder is None:
-            return reduce_solid(model)
-        return load_or_reduce_solid(model, folder)
-    if folder is None:
-        return reduce_shaft(model)
-    return load_or_reduce_shaft(model, folder)
+        return reduce_solid(model) if folder is None else load_or_reduce_solid(model, folder)
+    return reduce_shaft(model) if folder is None else load_or_reduce_shaft(model, folder)
 
 
 @lru_cache(maxsize=16)
