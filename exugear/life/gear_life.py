@@ -208,9 +208,9 @@ def flank_lives(
                 case = _RatedTooth(
                     gearbox, rating, tooth, pair, balance, stresses[pair.name], dynamic[tooth.family], sense
                 )
-                one = case.life(acting)
-                lives.setdefault((one.gear, one.family, one.flank), []).append(one)
-    return tuple(worst_of(life) for life in lives.values())
+                rated = case.life(acting)
+                lives.setdefault((rated.gear, rated.family, rated.flank), []).append(rated)
+    return tuple(worst_of(planets) for planets in lives.values())
 
 
 LEAST_COUNTS = ("compression", "contact_limit", "root_limit")
@@ -375,7 +375,7 @@ class _RatedTooth:
         roughness = 0.5 * (roughness_of(strength) + roughness_of(mate))
         still = lubricant_factor(softer, self.gearbox.viscosity_40)
         still *= roughness_factor(softer, roughness, reduced_radius(self.pair))
-        moving = np.array([velocity_factor(softer, self._velocity(float(one))) for one in speed])
+        moving = np.array([velocity_factor(softer, self._velocity(float(value))) for value in speed])
         return si(strength, "sigma_H_lim_MPa") * still * moving
 
     def _velocity(self, speed: float) -> float:
