@@ -109,7 +109,9 @@ def _mm(length: float, beside: float | None = None) -> str:
 
 def _small(length: float) -> str:
     """Size of an overlap: in micrometres where four decimals of a millimetre would not show it."""
-    return _mm(length) if length >= 5e-6 else f"{1e6 * length:.3g} um"
+    if length >= 5e-6:
+        return _mm(length)
+    return f"{1e6 * length:.3g} um"
 
 
 def _deg(angle: float) -> str:
