@@ -9,7 +9,7 @@ import numpy as np
 from timing import Cost, timed
 
 from exugear.system.kernels.meshes import stiffness_at
-from exugear.system.loads import Loading
+from exugear.system.loads import LoadTable
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.element import MeshElement
 from exugear.transient.exudyn_model.library import exudyn, items
@@ -65,7 +65,7 @@ class PythonMesh:
 
 def with_python_meshes(assembly: Assembly, q: np.ndarray, v: np.ndarray, load: dict[str, float]) -> ExudynSystem:
     """Build the bushing variant with one plain Python object per mesh, without a jacobian of its own."""
-    system = ExudynSystem(assembly, q, v, Loading(load), with_meshes=False)
+    system = ExudynSystem(assembly, q, v, LoadTable(load), with_meshes=False)
     for element in assembly.elements:
         PythonMesh(system, element)
     system.mbs.Assemble()
@@ -76,12 +76,12 @@ def system_of(
     assembly: Assembly, q: np.ndarray, v: np.ndarray, load: dict[str, float], route: MeshRoute = "element"
 ) -> ExudynSystem:
     """Build the variant as the program does."""
-    return ExudynSystem(assembly, q, v, Loading(load), route)
+    return ExudynSystem(assembly, q, v, LoadTable(load), route)
 
 
 def without_meshes(assembly: Assembly, q: np.ndarray, v: np.ndarray) -> ExudynSystem:
     """Build bodies and bearings alone."""
-    return ExudynSystem(assembly, q, v, Loading(), with_meshes=False)
+    return ExudynSystem(assembly, q, v, LoadTable(), with_meshes=False)
 
 
 def solve(system: ExudynSystem, steps: int, step: float, method: str) -> None:

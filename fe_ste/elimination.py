@@ -191,9 +191,7 @@ def available_backends() -> tuple[Backend, ...]:
     >>> "superlu" in available_backends()
     True
     """
-    if importlib.util.find_spec("pypardiso"):
-        return ("pardiso", "superlu")
-    return ("superlu",)
+    return ("pardiso", "superlu") if importlib.util.find_spec("pypardiso") else ("superlu",)
 
 
 def factorise(matrix: SparseMatrix, backend: Backend | None = None) -> Factorisation:
@@ -279,8 +277,6 @@ def _dense_columns(vectors: Floats | SparseMatrix) -> Floats:
     dense = vectors if isinstance(vectors, np.ndarray) else vectors.toarray(order="F")
     return np.asfortranarray(dense, dtype=np.float64)
 
-
-# Dense linear algebra in place, by SciPy's BLAS and LAPACK, on parts of arrays and without Python's lock
 
 #: Columns eliminated at a time: the triangular solves, three to five times slower than products, stay a small part.
 _PANEL = 64
@@ -515,9 +511,7 @@ def _sorted_borders(front: Front, place: Integers) -> Front:
 def parts_without(front: Front, blocks: Integers) -> list[Front]:
     """Return the largest parts of a dissection in which no cell couples any of some blocks."""
     found, untouched = _parts_without(front, set(blocks.tolist()))
-    if untouched:
-        return [front]
-    return found
+    return [front] if untouched else found
 
 
 def _parts_without(front: Front, blocks: set[int]) -> tuple[list[Front], bool]:

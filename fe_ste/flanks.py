@@ -40,8 +40,6 @@ from fe_ste.geometry.gears import Gear
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 
-# Flank topography: material removed over a grid of radii and axial positions, as a gear measuring machine gives it
-
 
 @dataclass(frozen=True)
 class FlankTopography(ReprMixin):
@@ -177,9 +175,6 @@ def _interval(nodes: Floats, at: Floats) -> tuple[Integers, Floats]:
     within = np.clip(at, nodes[0], nodes[-1])
     interval = np.clip(np.searchsorted(nodes, within, side="right") - 1, 0, len(nodes) - 2)
     return interval, (within - nodes[interval]) / (nodes[interval + 1] - nodes[interval])
-
-
-# Flank modifications: material removed from the involute flank, as a gap over the flank
 
 
 class ReliefShape(StrEnum):
@@ -340,9 +335,7 @@ def _relief_gap(gear: Gear, key: str, relief: Relief, roll_length: Floats, end: 
 def _slope(amount: float, position: Floats) -> Floats:
     """Linear gap over positions 0 to 1 that is zero at one end: at 0, or at 1 for a negative amount."""
     within = np.clip(position, 0.0, 1.0)
-    if amount >= 0.0:
-        return amount * within
-    return -amount * (1.0 - within)
+    return amount * within if amount >= 0.0 else -amount * (1.0 - within)
 
 
 def radius_at_roll_length_from_tip(gear: Gear, roll_length: float) -> float:

@@ -30,8 +30,6 @@ from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.threads import one_dense_thread
 from fe_ste.transmission_error.contact_stress import PATH_MARGIN
 
-# Strain gauges on the root of a tooth: surface strains as linear read-outs of a sector's displacements
-
 COMPONENTS = 3
 """Strains of a gauge: along the section, along the face, shear."""
 
@@ -133,8 +131,6 @@ def gauge_columns(mesh: SectorMesh, places: GaugePlaces) -> SparseMatrix:
     return matrix.tocsr()
 
 
-# Root stress of a gear by loads on its flanks: the gauges' stress in the closed ring, tooth by tooth
-
 REACH = 3
 """Teeth on either side of the loaded one whose roots are read: beyond, less than a hundredth is felt."""
 
@@ -156,8 +152,8 @@ class RootGauges(ReprMixin, line=" of {gear.name!r}: {places.edges!n} edges, {ax
 
     def node_loads(self, roll: Floats, axial: Floats, force: Floats) -> Floats:
         """Share forces (N) at places of a flank among its nodes, bilinear, (f l,); places off the flank at its edge."""
-        first, along = _interval(self.roll, roll)
-        layer, across = _interval(self.axial, axial)
+        first, along = _place(self.roll, roll)
+        layer, across = _place(self.axial, axial)
         loads = np.zeros((len(self.roll), len(self.axial)))
         for step, share in ((0, 1.0 - along), (1, along)):
             for up, width in ((0, 1.0 - across), (1, across)):
@@ -181,13 +177,6 @@ class RootGauges(ReprMixin, line=" of {gear.name!r}: {places.edges!n} edges, {ax
         mean = 0.5 * (total[:, :, 0] + total[:, :, 1])
         radius = np.hypot(0.5 * (total[:, :, 0] - total[:, :, 1]), total[:, :, 2])
         return mean + radius, mean - radius
-
-
-def _interval(grid: Floats, values: Floats) -> tuple[np.ndarray, Floats]:
-    """Interval of a rising grid and the place in it, from 0 to 1."""
-    at = np.clip(values, grid[0], grid[-1])
-    first = np.clip(np.searchsorted(grid, at, side="right") - 1, 0, len(grid) - 2)
-    return first, (at - grid[first]) / (grid[first + 1] - grid[first])
 
 
 def root_gauges(gear: Gear, side: int, settings: MeshSettings | None = None) -> RootGauges:
@@ -235,8 +224,6 @@ def _stress(gear: Gear, strain: Floats) -> Floats:
         axis=1,
     )
 
-
-# Stress of a pair over its mesh cycle from the line loads of a table: Hertz at the flanks, bending at the roots
 
 CLEAR_OF_FILLET = 0.5
 """Modules along the flank from its end above the fillet within which a load acts no nearer to the gauges."""

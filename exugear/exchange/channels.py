@@ -143,7 +143,7 @@ class Channels(ReprMixin):
             if candidate in lower:
                 return lower.index(candidate)
         near = difflib.get_close_matches(wanted, lower, n=3, cutoff=0.5)
-        likely = [self.names[lower.index(one)] for one in near] or list(self.names[:SHOWN_NAMES])
+        likely = [self.names[lower.index(name)] for name in near] or list(self.names[:SHOWN_NAMES])
         raise LoadFileError(
             f"{self.path}: no channel {name!r}; "
             f"{'names like it are' if near else 'its channels are'} {', '.join(likely)}"

@@ -135,9 +135,7 @@ def fortran_number(word: str) -> float:
     (1.2345e-101, -450.0, 7.0)
     """
     found = FORTRAN_NUMBER.fullmatch(word)
-    if found is not None:
-        return float(f"{found[1]}e{found[2]}")
-    return float(word)
+    return float(f"{found[1]}e{found[2]}") if found is not None else float(word)
 
 
 @dataclass(frozen=True)
@@ -185,8 +183,6 @@ class _Table:
             rows.append(row)
         return np.array(rows)
 
-
-# Tables of numbers as text: OpenFAST's text output, and comma-separated tables whose headings contain units
 
 ENDINGS = ("_N_m", "_kN_m", "_MN_m", "_N", "_kN", "_MN", "_rpm", "_rad_per_s", "_m_per_s", "_s", "_ms", "_min", "_h")
 """Units at the end of headings of comma-separated tables; longer ones first if one ends with another."""
@@ -294,8 +290,6 @@ def _unit_of_heading(path: Path, heading: str) -> str:
             return ending.replace("_per_", "/").replace("_", " ").strip()
     raise LoadFileError(f"{path}: heading {heading!r} ends in no unit; endings are {', '.join(ENDINGS)}")
 
-
-# Binary output of OpenFAST (``.outb``), all four formats
 
 WITH_TIME, WITHOUT_TIME, NOT_COMPRESSED, LONG_NAMES = 1, 2, 3, 4
 """Formats of the file, identified by its first number."""
@@ -429,8 +423,6 @@ def _blocks(path: Path, layout: _ValueLayout, places: tuple[int, ...]) -> Iterat
             rows = np.frombuffer(file.read(width * count), dtype=layout.value).reshape(count, -1)[:, chosen]
             yield time, (rows.astype(np.float64) - layout.offsets[chosen]) / layout.scales[chosen]
 
-
-# Load files over time, read according to their extension
 
 LARGEST_SERIES = 2_000_000_000
 """Maximum size of a file, bytes."""

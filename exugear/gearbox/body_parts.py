@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from exugear.gearbox.named_files import LARGEST_TABLE
 from exugear.gearbox.parts import Bearing, Body, Coupling, DampingTimes, Joint, LoadCase, PointForce
 from exugear.gearbox.reading import Origin, part_of_each, parts_of_each
-from exugear.gearbox.sections.bodies import BodySection, InertiaSection, ShaftSectionSection
+from exugear.gearbox.sections.bodies import BodySection, InertiaSection
 from exugear.gearbox.sections.case import DampingSection, ForceSection, GearboxFile, LoadCaseSection
 from exugear.gearbox.sections.connections import (
     BearingSection,
@@ -20,10 +20,8 @@ from exugear.gearbox.sections.connections import (
 )
 from exugear.gearbox.sections.entries import GROUND
 from exugear.gearbox.sections.gears import GearSection, PinSection
-from exugear.gearbox.units import MM, RPM, UM
+from exugear.gearbox.units import MM, RPM, UM, optional_si, si
 from fe_ste.geometry.cylinders import MassProperties, Tube, mass_properties, together
-
-# Bodies, position errors of planet pins, and load cases
 
 
 def damping_times(section: DampingSection) -> DampingTimes:
@@ -46,9 +44,7 @@ def inertia_sets(origin: Origin) -> tuple[str, ...]:
     """
     moving = [section for section in origin.enabled.values() if not section.fixed]
     named = next((section.inertia for section in moving if section.inertia), None)
-    if moving:
-        return tuple(named or (origin.case.default_inertias,))
-    return ()
+    return tuple(named or (origin.case.default_inertias,)) if moving else ()
 
 
 def bodies(origin: Origin, inertias: str) -> tuple[Body, ...]:
@@ -81,33 +77,21 @@ def _family(origin: Origin, family: str, section: BodySection, inertias: str) ->
     angles = [math.radians(angle) for angle in section.planet_angles_deg] or [0.0]
     held = section.carrier is not None and origin.case.bodies[section.carrier].fixed
     for suffix, angle in zip(origin.suffixes(family), angles, strict=True):
-        yield _body(family, suffix, section, inertia, angle, _axis(origin, family, angle), held)
-
-
-def _body(
-    family: str,
-    suffix: str,
-    section: BodySection,
-    inertia: InertiaSection | None,
-    angle: float,
-    axis: tuple[float, float],
-    held: bool,
-) -> Body:
-    return Body(
-        name=family + suffix,
-        family=family,
-        axis=axis,
-        centre_of_mass_z=MM * ((inertia and inertia.centre_of_mass_z_mm) or 0.0),
-        mass=(inertia and inertia.mass_kg) or 0.0,
-        axial=inertia.axial_kg_m2 if inertia else 0.0,
-        transverse=(inertia and inertia.transverse_kg_m2) or 0.0,
-        carrier=None if section.carrier is None or held else section.carrier,
-        orbit_angle=angle if section.carrier else 0.0,
-        spin_only=section.spin_only,
-        fixed=section.fixed,
-        wheels={gear: z * MM for gear, z in section.gears_z_mm.items()},
-        planet_of=section.carrier,
-    )
+        yield Body(
+            name=family + suffix,
+            family=family,
+            axis=_axis(origin, family, angle),
+            centre_of_mass_z=MM * ((inertia and inertia.centre_of_mass_z_mm) or 0.0),
+            mass=(inertia and inertia.mass_kg) or 0.0,
+            axial=inertia.axial_kg_m2 if inertia else 0.0,
+            transverse=(inertia and inertia.transverse_kg_m2) or 0.0,
+            carrier=None if section.carrier is None or held else section.carrier,
+            orbit_angle=angle if section.carrier else 0.0,
+            spin_only=section.spin_only,
+            fixed=section.fixed,
+            wheels={gear: z * MM for gear, z in section.gears_z_mm.items()},
+            planet_of=section.carrier,
+        )
 
 
 def _computed_inertia(origin: Origin, family: str, section: BodySection) -> InertiaSection:
@@ -120,10 +104,19 @@ def _computed_inertia(origin: Origin, family: str, section: BodySection) -> Iner
     rings: list[MassProperties] = []
     shape = section.shape
     if shape is not None:
-        start = MM * shape.start_z_mm
+        start = si(shape, "start_z_mm")
         for piece in shape.sections:
-            tubes.append(_tube(piece, start, shape.material.density_kg_per_m3))
-            start += tubes[-1].length
+            tube = Tube(
+                start=start,
+                length=si(piece, "length_mm"),
+                outer=si(piece, "outer_diameter_mm"),
+                inner=si(piece, "inner_diameter_mm"),
+                density=shape.material.density_kg_per_m3,
+                outer_end=optional_si(piece, "outer_diameter_end_mm"),
+                inner_end=optional_si(piece, "inner_diameter_end_mm"),
+            )
+            tubes.append(tube)
+            start += tube.length
         places = blank_places(origin.case, family)
         for name, blank in shape.blanks.items():
             if name in places:  # faults_of_blanks reports the others
@@ -163,26 +156,14 @@ def blank_places(case: GearboxFile, family: str) -> dict[str, float]:
     return places
 
 
-def _tube(piece: ShaftSectionSection, start: float, density: float) -> Tube:
-    ends = (piece.outer_diameter_end_mm, piece.inner_diameter_end_mm)
-    outer_end, inner_end = (None if end is None else MM * end for end in ends)
-    return Tube(
-        start=start,
-        length=MM * piece.length_mm,
-        outer=MM * piece.outer_diameter_mm,
-        inner=MM * piece.inner_diameter_mm,
-        density=density,
-        outer_end=outer_end,
-        inner_end=inner_end,
-    )
-
-
 def gear_tube(gear: GearSection, z: float, shaft: Sequence[Tube]) -> Tube:
     """Gear body on a shaft: a tube up to the reference circle, centred on the face width at z (m)."""
-    reference = MM * gear.teeth * gear.normal_module_mm / math.cos(math.radians(gear.helix_angle_deg))
-    width = MM * gear.face_width_mm
-    held = MM * gear.held_diameter_mm
-    under = [one.outer for one in shaft if one.start < z + 0.5 * width and one.start + one.length > z - 0.5 * width]
+    reference = MM * gear.teeth * gear.normal_module_mm / math.cos(si(gear, "helix_angle_deg"))
+    width = si(gear, "face_width_mm")
+    held = si(gear, "held_diameter_mm")
+    under = [
+        tube.outer for tube in shaft if tube.start < z + 0.5 * width and tube.start + tube.length > z - 0.5 * width
+    ]
     inner, outer = (reference, held) if gear.internal else (min(max([held, *under]), reference), reference)
     density = gear.material.density_kg_per_m3
     return Tube(start=z - 0.5 * width, length=width, outer=outer, inner=inner, density=density)
@@ -273,18 +254,15 @@ def load_cases(origin: Origin, spinning: Sequence[str]) -> dict[str, LoadCase]:
             torques=dict(section.torques_N_m),
             torque_series=series,
             duration=section.duration_s,
-            start_speed=section.start_speed_rpm * RPM,
+            start_speed=si(section, "start_speed_rpm"),
             start_speeds={body: speed * RPM for body, speed in section.start_speeds_rpm.items()},
             driven_body=section.driven_body,
-            end_speed=None if section.end_speed_rpm is None else section.end_speed_rpm * RPM,
+            end_speed=optional_si(section, "end_speed_rpm"),
             drive_stiffness=section.drive_stiffness_N_m_per_rad,
             description=section.description,
         )
 
     return part_of_each(load_case, origin.case.load_cases)
-
-
-# Supports of bodies and connections of their rotations: joints, bearings, mounts, couplings
 
 
 def joints(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Joint, ...]:
@@ -381,11 +359,11 @@ def _couplings_on_fixed_bodies(origin: Origin, bodies: Mapping[str, Body]) -> It
             continue
         if not _holds_on_a_fixed_body(origin, section):
             continue
-        on, body = sorted(section.bodies, key=lambda one: not origin.case.bodies[one].fixed)
+        on, body = sorted(section.bodies, key=lambda body: not origin.case.bodies[body].fixed)
         seat = origin.case.bearings.get(section.seat or "")
         place = bodies[body].centre_of_mass_z
         if seat is not None:
-            place = MM * seat.z_mm
+            place = si(seat, "z_mm")
         damping = section.damping_N_m_s_per_rad
         if damping is None:
             damping = damping_times(origin.case.damping).coupling * section.stiffness_N_m_per_rad

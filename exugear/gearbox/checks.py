@@ -1,6 +1,7 @@
 """Consistency checks between the parts of a gearbox: masses, positions, assembly of planets, supports.
 
-Each function compares the parts passed to it and yields error texts with the key, its value and the remedy.
+Each function compares the parts passed to it and yields error texts with the key, its value and the remedy. `CHECKS`
+lists all of them in order.
 """
 
 from __future__ import annotations
@@ -8,16 +9,17 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from exugear.gearbox.body_parts import blank_places
-from exugear.gearbox.parts import Bearing, Body, Coupling, Joint, Mesh, PointForce, connector_matrix
+from exugear.gearbox.parts import Bearing, Body, Coupling, Joint, LoadCase, Mesh, PointForce, connector_matrix
 from exugear.gearbox.reading import GearboxFileError, known_names, shortened
-from exugear.gearbox.sections.case import GearboxFile, OverallSection
+from exugear.gearbox.sections.case import GearboxFile
 from exugear.gearbox.sections.connections import BearingSection, ConnectorDampingSection, StiffnessSection
 from exugear.gearbox.sections.entries import GROUND
+from exugear.gearbox.train import Train
 from fe_ste.geometry.gears import Gear
 
 CENTRE_DISTANCE_TOLERANCE = 2e-5
@@ -31,49 +33,8 @@ MATRIX_TOLERANCE = 1e-4
 LARGEST_MATRICES = 2e9
 """Memory limit for the matrices of all elements together, bytes; each matrix covers the coordinates of all bodies."""
 
-
-@dataclass(frozen=True)
-class Check:
-    """One check of a gearbox."""
-
-    name: str
-    run: Callable[[], object]
-    """Function that raises `GearboxFileError` if the check fails."""
-    needs: tuple[str, ...] = ()
-    """Names of the checks that must succeed before this one is run."""
-
-
-def check(checks: Iterable[Check]) -> None:
-    """Run all checks and raise their errors together; `errors_of` states which checks are skipped.
-
-    Raises
-    ------
-    GearboxFileError
-        All errors that were found.
-
-    Examples
-    --------
-    >>> check([Check("gears", lambda: None), Check("pairs", lambda: None, ("gears",))])
-    """
-    errors = errors_of(checks)
-    if errors:
-        raise GearboxFileError(*errors)
-
-
-def errors_of(checks: Iterable[Check]) -> list[str]:
-    """Return the errors of all checks in order, skipping checks whose prerequisites failed or were skipped."""
-    errors: list[str] = []
-    failed: set[str] = set()
-    for one in checks:
-        if failed & set(one.needs):
-            failed.add(one.name)
-            continue
-        try:
-            one.run()
-        except GearboxFileError as error:
-            errors += error.errors
-            failed.add(one.name)
-    return errors
+Element = Mesh | Bearing | Coupling | PointForce
+"""Part that exerts forces."""
 
 
 def errors_of_bodies(case: GearboxFile) -> Iterator[str]:
@@ -126,50 +87,47 @@ def _errors_of_carrier(case: GearboxFile, key: str, name: str) -> Iterator[str]:
         yield f"{key}: a spin-only body has no position and cannot carry planets"
 
 
-def errors_of_inertia_sets(default: str, inertia_sets: Sequence[str]) -> Iterator[str]:
+def errors_of_inertia_sets(case: GearboxFile, inertia_sets: Sequence[str]) -> Iterator[str]:
     """Yield an error if no body moves, or if no body has the default inertia set."""
     if not inertia_sets:
         yield "bodies: all bodies are fixed; a gearbox needs at least one body without fixed = true"
-    elif default not in inertia_sets:
-        yield f"default_inertias = {default!r}: no such set; sets are {', '.join(inertia_sets)}"
+    elif case.default_inertias not in inertia_sets:
+        yield f"default_inertias = {case.default_inertias!r}: no such set; sets are {', '.join(inertia_sets)}"
 
 
-def errors_of_size(bodies: int, elements: int) -> Iterator[str]:
-    """Yield an error if the matrices exceed the memory: each element has stiffness and damping over all coordinates.
-
-    Parameters
-    ----------
-    bodies : number of bodies
-    elements : number of meshes, bearings, mounts and couplings together
-    """
-    coordinates = 6 * bodies
-    if 16.0 * elements * coordinates**2 > LARGEST_MATRICES:
+def errors_of_size(named_bodies: Mapping[str, Body], elements: Mapping[str, Sequence[Element]]) -> Iterator[str]:
+    """Yield an error if the matrices exceed the memory: each element has stiffness and damping over all coordinates."""
+    count = sum(map(len, elements.values()))
+    coordinates = 6 * len(named_bodies)
+    if 16.0 * count * coordinates**2 > LARGEST_MATRICES:
         yield (
-            f"bodies: {bodies} with {elements} meshes, bearings and couplings are too many: their "
+            f"bodies: {len(named_bodies)} with {count} meshes, bearings and couplings are too many: their "
             f"matrices take more than {1e-9 * LARGEST_MATRICES:g} GB"
         )
 
 
-def errors_of_overall(overall: OverallSection, spinning: Sequence[str], gears: Collection[str]) -> Iterator[str]:
+def errors_of_overall(case: GearboxFile, spinning: Sequence[str]) -> Iterator[str]:
     """Yield errors for an overall input or output that cannot rotate, or that is the same body although gears exist."""
+    overall = case.overall
     for key in ("input", "output"):
         if getattr(overall, key) not in spinning:
             yield (
                 f"overall.{key} = {getattr(overall, key)!r}: no such rotating body; bodies are {', '.join(spinning)}"
             )
             return
-    if overall.input == overall.output and gears:
+    if overall.input == overall.output and case.gears:
         yield f"overall.output = {overall.output!r}: is also the input; set the body at the other end"
 
 
 def errors_of_output_gear(
-    overall: OverallSection, gears: Collection[str], bodies: Iterable[Body], couplings: Sequence[Coupling]
+    case: GearboxFile, gears: Collection[str], named_bodies: Mapping[str, Body], couplings: Sequence[Coupling]
 ) -> Iterator[str]:
     """Yield an error if the output gear does not rotate with the output.
 
     The overall transmission error is expressed as a length at this gear. If the output has no gear, as with a carrier,
     every gear is accepted. A rotor without gears needs no output gear.
     """
+    overall = case.overall
     if overall.output_gear is None:
         if gears:
             yield (
@@ -181,21 +139,16 @@ def errors_of_output_gear(
         listed = known_names("gears", gears, f"gears.{overall.output_gear}")
         yield f"overall.output_gear = {overall.output_gear!r}: no such gear; {listed}"
         return
-    turning = _coupled(couplings, overall.output)
-    known = [gear for body in bodies if body.name in turning for gear in body.wheels]
+    # Names of the body and of all bodies that couplings connect to it; they rotate at one speed.
+    turning = {overall.output}
+    for _ in couplings:
+        turning |= {name for c in couplings if {c.first, c.second} & turning for name in (c.first, c.second)}
+    known = [gear for body in named_bodies.values() if body.name in turning for gear in body.wheels]
     if known and overall.output_gear not in known:
         yield (
             f"overall.output_gear = {overall.output_gear!r}: does not rotate with {overall.output}; gears that do are "
             f"{', '.join(known)}"
         )
-
-
-def _coupled(couplings: Sequence[Coupling], body: str) -> set[str]:
-    """Names of the body and of all bodies that couplings connect to it; they rotate at one speed."""
-    reached = {body}
-    for _ in couplings:
-        reached |= {name for c in couplings if {c.first, c.second} & reached for name in (c.first, c.second)}
-    return reached
 
 
 def errors_of_repetition(
@@ -222,7 +175,7 @@ def errors_of_mass_properties(case: GearboxFile) -> Iterator[str]:
                     )
 
 
-def errors_of_centre_distances(meshes: Iterable[Mesh], bodies: Mapping[str, Body]) -> Iterator[str]:
+def errors_of_centre_distances(meshes: Iterable[Mesh], named_bodies: Mapping[str, Body]) -> Iterator[str]:
     """Yield errors for body positions that contradict the centre distance of a pair or the axis of a carrier."""
     for mesh in meshes:
         difference = mesh.centre_distance - mesh.pair.centre_distance
@@ -233,8 +186,8 @@ def errors_of_centre_distances(meshes: Iterable[Mesh], bodies: Mapping[str, Body
                 f"below {CENTRE_DISTANCE_TOLERANCE * 1e3:g} mm"
             )
         for body in (mesh.pinion, mesh.gear):
-            if mesh.frame != GROUND and bodies[body].carrier is None:
-                apart = math.dist(bodies[body].axis, bodies[mesh.frame].axis)
+            if mesh.frame != GROUND and named_bodies[body].carrier is None:
+                apart = math.dist(named_bodies[body].axis, named_bodies[mesh.frame].axis)
                 if apart > AXIS_TOLERANCE:
                     yield (
                         f"meshes.{mesh.family}: {body} is {apart * 1e3:.4f} mm off the axis of {mesh.frame}, with "
@@ -243,10 +196,10 @@ def errors_of_centre_distances(meshes: Iterable[Mesh], bodies: Mapping[str, Body
 
 
 def errors_of_planets(
-    case: GearboxFile, bodies: Iterable[Body], gears: Mapping[str, Gear], meshes: Sequence[Mesh]
+    case: GearboxFile, named_bodies: Mapping[str, Body], gears: Mapping[str, Gear], meshes: Sequence[Mesh]
 ) -> Iterator[str]:
     """Yield errors for planets of one carrier that collide, in a set or between sets, and for impossible assembly."""
-    planets = [body for body in bodies if body.planet_of is not None]
+    planets = [body for body in named_bodies.values() if body.planet_of is not None]
     reported = set()
     for planet, other in itertools.combinations(planets, 2):
         if (planet.family, other.family) in reported or planet.planet_of != other.planet_of:
@@ -316,20 +269,9 @@ def _teeth_on_planet(mesh: Mesh, planet: str) -> tuple[int, int]:
     return gear.teeth, -pinion.teeth
 
 
-def errors_of_connection(
-    case: GearboxFile,
-    bodies: Iterable[Body],
-    meshes: Iterable[Mesh],
-    couplings: Iterable[Coupling],
-    held: Collection[str],
-) -> Iterator[str]:
-    """Yield errors for bodies without torsional support that no mesh, coupling or carrier connects to the input.
-
-    Parameters
-    ----------
-    held : bodies whose rotation is restrained by bearings or mounts, such as a bearing pedestal
-    """
-    lost = [name for name in bodies_apart(case, bodies, meshes, couplings) if name not in held]
+def errors_of_connection(case: GearboxFile, apart: Sequence[str], held_by_torsion: Collection[str]) -> Iterator[str]:
+    """Yield errors for bodies without torsional support that no mesh, coupling or carrier connects to the input."""
+    lost = [name for name in apart if name not in held_by_torsion]
     if lost:
         aside = [
             f"; couplings.{name} is disabled while bodies.{section.instead_of} is enabled"
@@ -410,15 +352,15 @@ def _bearings_at_one_place(bearings: Mapping[str, BearingSection]) -> Iterator[s
     names = [name for name, bearing in bearings.items() if bearing.catalogue is not None]
     for place, first in enumerate(names):
         for second in names[place + 1 :]:
-            one = bearings[first]
+            bearing = bearings[first]
             other = bearings[second]
-            distance = abs(one.z_mm - other.z_mm)
-            half = 0.5 * sum(bearing.catalogue.width_mm for bearing in (one, other) if bearing.catalogue)
-            if (one.body, one.on) == (other.body, other.on) and distance < 0.5 * half:
+            distance = abs(bearing.z_mm - other.z_mm)
+            half = 0.5 * sum(section.catalogue.width_mm for section in (bearing, other) if section.catalogue)
+            if (bearing.body, bearing.on) == (other.body, other.on) and distance < 0.5 * half:
                 yield (
                     f"bearings.{second}.z_mm = {other.z_mm:g}: is at the position of bearings.{first} ({distance:g} "
-                    f"mm apart), and both support {one.body} on {one.on}; set different positions, or one bearing "
-                    "with an arrangement"
+                    f"mm apart), and both support {bearing.body} on {bearing.on}; set different positions, or one "
+                    "bearing with an arrangement"
                 )
 
 
@@ -440,25 +382,20 @@ def _errors_of_matrix(key: str, section: StiffnessSection | ConnectorDampingSect
         yield f"{key}.matrix: is not positive semi-definite (negative eigenvalue); correct the matrix"
 
 
-def errors_of_seals(case: GearboxFile, bodies: Collection[str]) -> Iterator[str]:
+def errors_of_seals(case: GearboxFile, named_bodies: Collection[str]) -> Iterator[str]:
     """Yield an error for each seal between bodies that are not in the file, or between a body and itself."""
     for name, seal in case.seals.items():
         for key, body in (("body", seal.body), ("on", seal.on)):
-            if body not in bodies and not (key == "on" and body == GROUND):
-                yield f"seals.{name}.{key} = {body!r}: no such body; bodies are {', '.join(bodies)}"
+            if body not in named_bodies and not (key == "on" and body == GROUND):
+                yield f"seals.{name}.{key} = {body!r}: no such body; bodies are {', '.join(named_bodies)}"
         if seal.body == seal.on:
             yield f"seals.{name}.on = {seal.on!r}: is the body that the seal slides on; set another body, or remove on"
 
 
-def errors_of_names(parts: Mapping[str, Sequence[Mesh | Bearing | Coupling | PointForce]]) -> Iterator[str]:
-    """Yield an error for a name used twice among meshes, supports and couplings: these share one list in the results.
-
-    Parameters
-    ----------
-    parts : parts by their table in the gearbox file
-    """
+def errors_of_names(elements: Mapping[str, Sequence[Element]]) -> Iterator[str]:
+    """Yield an error for a name used twice among meshes, supports and couplings, since results list them together."""
     tables: dict[str, str] = {}
-    for table, members in parts.items():
+    for table, members in elements.items():
         for part in members:
             if part.name in tables:
                 yield f"{table}.{part.name}: also a name in [{tables[part.name]}]; rename one"
@@ -466,11 +403,11 @@ def errors_of_names(parts: Mapping[str, Sequence[Mesh | Bearing | Coupling | Poi
             tables[part.name] = table
 
 
-def errors_of_joints(joints: Iterable[Joint], bodies: Mapping[str, Body]) -> Iterator[str]:
+def errors_of_joints(joints: Iterable[Joint], named_bodies: Mapping[str, Body]) -> Iterator[str]:
     """Yield an error for the first invalid joint: on a fixed body, a second joint, or a planet off its carrier."""
     joined: dict[str, str] = {}
     for joint in joints:
-        body = bodies[joint.body]
+        body = named_bodies[joint.body]
         if body.fixed or body.spin_only:
             yield f"joints.{joint.name}.body = {joint.body!r}: a fixed or spin-only body cannot have a joint"
             return
@@ -484,3 +421,73 @@ def errors_of_joints(joints: Iterable[Joint], bodies: Mapping[str, Body]) -> Ite
             yield f"joints.{joint.name}.on = {joint.on!r}: the joint of a planet is on its carrier {body.carrier!r}"
             return
         joined[joint.body] = joint.name
+
+
+def errors_of_train(
+    train: Train,
+    gears: Collection[str],
+    meshes: Sequence[Mesh],
+    load_cases: Mapping[str, LoadCase],
+    start_speeds: Callable[[LoadCase], object],
+) -> Iterator[str]:
+    """Check that the static load can be reacted and that the train has consistent kinematics from input to output."""
+    train.static_mesh_forces()
+    if gears and not meshes:
+        yield "meshes: none is enabled; a gearbox with gears needs at least one"
+        return
+    _ = train.ratio
+    for case in load_cases.values():
+        try:
+            start_speeds(case)
+        except GearboxFileError as error:
+            key = f"load_cases.{case.name}.start_speeds_rpm"
+            raise GearboxFileError(*(f"{line}; see {key}" for line in error.errors)) from None
+
+
+class Check(NamedTuple):
+    """One check of a gearbox; it is skipped if a check that it needs fails or is skipped."""
+
+    name: str
+    """Name of the check; without a function, the attribute of the gearbox that is built, which checks its sections."""
+    errors: Callable[..., Iterable[str]] | None = None
+    """Function that yields error texts; its parameters are attributes of the gearbox."""
+    needs: tuple[str, ...] = ()
+    """Names of the checks that must succeed before this one is run."""
+
+
+CHECKS = (
+    Check("names of bodies", errors_of_bodies),
+    Check("masses", errors_of_mass_properties),
+    Check("gears"),
+    Check("file_stiffness"),
+    Check("supports", errors_of_supports),
+    Check("inertia sets", errors_of_inertia_sets, ("names of bodies", "masses")),
+    Check("bodies_by_inertias", None, ("inertia sets",)),
+    Check("modifications", None, ("gears",)),
+    Check("gear_pairs", None, ("gears",)),
+    Check("ends", errors_of_overall, ("bodies_by_inertias",)),
+    Check("bearings", None, ("bodies_by_inertias",)),
+    Check("joints", None, ("bodies_by_inertias",)),
+    Check("mounts", None, ("bodies_by_inertias",)),
+    Check("forces", None, ("bodies_by_inertias",)),
+    Check("load_cases", None, ("bodies_by_inertias",)),
+    Check("pin_offsets", None, ("bodies_by_inertias",)),
+    Check("blanks", errors_of_blanks, ("bearings", "mounts", "forces")),
+    Check("meshes", None, ("bodies_by_inertias", "gear_pairs")),
+    Check("couplings", None, ("bearings",)),
+    Check("deviations", None, ("bodies_by_inertias", "gears")),
+    Check("distances", errors_of_centre_distances, ("meshes",)),
+    Check("planets", errors_of_planets, ("meshes",)),
+    Check("size", errors_of_size, ("meshes", "bearings", "mounts", "couplings", "forces")),
+    Check("connection", errors_of_connection, ("ends", "meshes", "couplings", "mounts")),
+    Check("torsion", errors_of_torsion, ("couplings", "supports")),
+    Check("seals", errors_of_seals, ("ends",)),
+    Check("names", errors_of_names, ("meshes", "bearings", "mounts", "couplings", "forces")),
+    Check("axes", errors_of_joints, ("joints",)),
+    Check("repetition", errors_of_repetition, ("deviations", "pin_offsets")),
+    Check("output", errors_of_output_gear, ("ends", "gears", "couplings")),
+    Check("train", errors_of_train, ("connection", "size", "load_cases")),
+)
+"""Checks in the order in which they are run."""
+ALONE = ("names of bodies", "masses", "gears", "file_stiffness", "supports", "modifications", "gear_pairs")
+"""Checks that remain meaningful if other entries of the file cannot be read."""

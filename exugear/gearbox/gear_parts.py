@@ -25,7 +25,7 @@ from exugear.gearbox.sections.gears import (
     ModificationSection,
     PairSection,
 )
-from exugear.gearbox.units import GPA, MM, UM
+from exugear.gearbox.units import MM, UM, optional_si, si
 from fe_ste.flanks import (
     FlankModification,
     FlankTopography,
@@ -123,10 +123,10 @@ def _flagged(origin: Origin, what: Literal["shift", "tip"]) -> dict[str, GearSec
 def _pairs_of(origin: Origin, gears: Mapping[str, GearInputs], name: str) -> Iterator[tuple[str, UncheckedPair]]:
     """Yield the pairs of a gear with their names; gear 1 is the external or smaller gear."""
     for pair, section in origin.case.pairs.items():
-        both = [gears[one] for one in (section.pinion, section.gear) if one in gears]
+        both = [gears[gear] for gear in (section.pinion, section.gear) if gear in gears]
         if name in (section.pinion, section.gear) and len(both) == 2:
             first, second = sorted(both, key=lambda gear: (gear.internal, gear.teeth))
-            distance = MM * section.centre_distance_mm
+            distance = si(section, "centre_distance_mm")
             yield pair, UncheckedPair(name=pair, pinion=first, gear=second, centre_distance=distance)
 
 
@@ -223,24 +223,24 @@ def _unchecked(name: str, section: GearSection) -> GearInputs:
     return GearInputs(
         name=name,
         teeth=section.teeth,
-        normal_module=section.normal_module_mm * MM,
-        normal_pressure_angle=math.radians(section.normal_pressure_angle_deg),
-        helix_angle=math.radians(section.helix_angle_deg),
+        normal_module=si(section, "normal_module_mm"),
+        normal_pressure_angle=si(section, "normal_pressure_angle_deg"),
+        helix_angle=si(section, "helix_angle_deg"),
         profile_shift=section.profile_shift,
-        face_width=section.face_width_mm * MM,
-        held_diameter=section.held_diameter_mm * MM,
+        face_width=si(section, "face_width_mm"),
+        held_diameter=si(section, "held_diameter_mm"),
         internal=section.internal,
         rack=BasicRack(section.rack.addendum, section.rack.dedendum, section.rack.tip_radius),
-        tip_diameter=None if section.tip_diameter_mm is None else section.tip_diameter_mm * MM,
-        root_diameter=None if section.root_diameter_mm is None else section.root_diameter_mm * MM,
+        tip_diameter=optional_si(section, "tip_diameter_mm"),
+        root_diameter=optional_si(section, "root_diameter_mm"),
         tooth_thinning=sum(thinning_range(section)) / 2.0,
         material=Material(
-            youngs_modulus=section.material.youngs_modulus_GPa * GPA,
+            youngs_modulus=si(section.material, "youngs_modulus_GPa"),
             poissons_ratio=section.material.poissons_ratio,
             density=section.material.density_kg_per_m3,
         ),
-        tip_form_diameter=None if section.tip_form_diameter_mm is None else section.tip_form_diameter_mm * MM,
-        root_form_diameter=None if section.root_form_diameter_mm is None else section.root_form_diameter_mm * MM,
+        tip_form_diameter=optional_si(section, "tip_form_diameter_mm"),
+        root_form_diameter=optional_si(section, "root_form_diameter_mm"),
         cutter=pinion_cutter(section.cutter, section.normal_module_mm, section.helix_angle_deg),
     )
 
@@ -260,12 +260,13 @@ def thinning_range(section: GearSection) -> tuple[float, float]:
     """Minimum and maximum tooth thinning in the transverse section, m; both are equal without allowances."""
     allowances = section.tooth_thickness
     if allowances is None:
-        return section.tooth_thinning_mm * MM, section.tooth_thinning_mm * MM
+        thinning = si(section, "tooth_thinning_mm")
+        return thinning, thinning
     upper = allowances.upper_allowance_um
     lower = allowances.lower_allowance_um
     if lower is None:
         lower = upper - (allowances.tolerance_um or 0.0)
-    transverse = -UM / math.cos(math.radians(section.helix_angle_deg))
+    transverse = -UM / math.cos(si(section, "helix_angle_deg"))
     return transverse * upper, transverse * lower
 
 
@@ -314,11 +315,11 @@ def _modification(gear: Gear, section: GearSection, find: Callable[[str], Path])
     modification = FlankModification(
         tip_relief=_relief(gear, given, "tip", radius_at_roll_length_from_tip),
         root_relief=_relief(gear, given, "root", radius_at_roll_length_from_root),
-        profile_crowning=UM * given.profile_crowning_um,
-        lead_crowning=UM * given.lead_crowning_um,
-        profile_slope=UM * given.profile_slope_um,
-        helix_slope=UM * given.helix_slope_um,
-        twist=UM * given.twist_um,
+        profile_crowning=si(given, "profile_crowning_um"),
+        lead_crowning=si(given, "lead_crowning_um"),
+        profile_slope=si(given, "profile_slope_um"),
+        helix_slope=si(given, "helix_slope_um"),
+        twist=si(given, "twist_um"),
         topography=None if given.topography is None else FlankTopography.from_csv(find(given.topography)),
     )
     modification.gap(gear, np.array(gear.tip_radius), np.array(0.0))  # refuses a relief that starts off the involute
@@ -328,16 +329,15 @@ def _modification(gear: Gear, section: GearSection, find: Callable[[str], Path])
 def _relief(
     gear: Gear, given: ModificationSection, kind: str, from_end: Callable[[Gear, float], float]
 ) -> Relief | None:
-    amount_um = getattr(given, f"{kind}_relief_um")
-    if amount_um == 0.0:
+    amount = si(given, f"{kind}_relief_um")
+    if amount == 0.0:
         return None
-    length_mm = getattr(given, f"{kind}_relief_length_mm")
-    start_roll_deg = getattr(given, f"{kind}_relief_start_roll_deg")
-    if length_mm is not None:
-        radius = from_end(gear, MM * length_mm)
+    start_roll = optional_si(given, f"{kind}_relief_start_roll_deg")
+    if start_roll is None:
+        radius = from_end(gear, si(given, f"{kind}_relief_length_mm"))
     else:
-        radius = gear.base_radius * math.hypot(1.0, math.radians(start_roll_deg))
-    return Relief(UM * amount_um, radius, ReliefShape(getattr(given, f"{kind}_relief_shape")))
+        radius = gear.base_radius * math.hypot(1.0, start_roll)
+    return Relief(amount, radius, ReliefShape(getattr(given, f"{kind}_relief_shape")))
 
 
 def _check_depth(origin: Origin, key: str, amounts: Mapping[str, Any], module_mm: float) -> None:
@@ -373,8 +373,8 @@ def gear_pairs(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, GearPair]
             name=name,
             pinion=first,
             gear=second,
-            centre_distance=section.centre_distance_mm * MM,
-            common_face_width=(None if section.common_face_width_mm is None else section.common_face_width_mm * MM),
+            centre_distance=si(section, "centre_distance_mm"),
+            common_face_width=optional_si(section, "common_face_width_mm"),
         )
 
     return part_of_each(convert_section, origin.case.pairs)
@@ -578,6 +578,6 @@ def _deviation(origin: Origin, key: str, gear: Gear, section: DeviationSection) 
     return WheelDeviation(
         teeth=gear.teeth,
         pitch=pitch * gear.base_radius / gear.reference_radius,
-        eccentricity=0.5 * UM * section.runout_um,
-        eccentricity_angle=math.radians(section.runout_angle_deg),
+        eccentricity=0.5 * si(section, "runout_um"),
+        eccentricity_angle=si(section, "runout_angle_deg"),
     )

@@ -8,14 +8,16 @@ written once in the file. Here it appears as one body, support and mesh per plan
 from __future__ import annotations
 
 import difflib
+import inspect
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from exugear.gearbox import body_parts, checks, gear_parts
+from exugear.gearbox import body_parts, gear_parts
+from exugear.gearbox.checks import ALONE, CHECKS, Check, Element, bodies_apart
 from exugear.gearbox.named_files import NOTHING_MORE, Permissions
 from exugear.gearbox.parts import (
     Bearing,
@@ -99,11 +101,11 @@ class Gearbox(ReprMixin):
             case = parse_case(dict(content), source)
         except GearboxFileError as error:
             rest = cls(readable(content), source, content, permissions)
-            alone = [check for check in _checks_of_parts(rest) if check.name in ALONE]
-            raise GearboxFileError(*error.errors, *checks.errors_of(alone)) from None
+            alone = [check for check in CHECKS if check.name in ALONE]
+            raise GearboxFileError(*error.errors, *_errors(rest, alone)) from None
         gearbox = cls(case, source, content, permissions)
-        # Each check follows its prerequisites; building a part checks its section.
-        checks.check([*_checks_of_parts(gearbox), *_checks_of_the_whole(gearbox)])
+        if errors := _errors(gearbox, CHECKS):
+            raise GearboxFileError(*errors)
         return gearbox
 
     def varied(self, changes: Mapping[str, Any]) -> Gearbox:
@@ -265,6 +267,11 @@ class Gearbox(ReprMixin):
         return bodies[name]
 
     @cached_property
+    def bodies_by_inertias(self) -> dict[str, tuple[Body, ...]]:
+        """All enabled bodies by inertia set."""
+        return {inertias: self.bodies(inertias) for inertias in self.inertia_sets}
+
+    @cached_property
     def named_bodies(self) -> dict[str, Body]:
         """All enabled bodies by name, with the default inertia set."""
         return {body.name: body for body in self.bodies()}
@@ -320,6 +327,17 @@ class Gearbox(ReprMixin):
     def couplings(self) -> tuple[Coupling, ...]:
         """Torsional springs between rotating bodies."""
         return body_parts.couplings(self._origin, self.spinning, [bearing.name for bearing in self.bearings])
+
+    @property
+    def elements(self) -> dict[str, Sequence[Element]]:
+        """Parts that exert forces, by their table in the file."""
+        return {
+            "meshes": self.meshes,
+            "bearings": self.bearings,
+            "mounts": self.mounts,
+            "couplings": self.couplings,
+            "forces": self.forces,
+        }
 
     # -- gears -------------------------------------------------------------------------------------------
 
@@ -390,7 +408,7 @@ class Gearbox(ReprMixin):
     @cached_property
     def apart(self) -> tuple[str, ...]:
         """Movable bodies that do not belong to the train, such as a pedestal between a bearing and the ground."""
-        return checks.bodies_apart(self.case, self.named_bodies.values(), self.meshes, self.couplings)
+        return bodies_apart(self.case, self.named_bodies.values(), self.meshes, self.couplings)
 
     @property
     def locked(self) -> tuple[str, ...]:
@@ -459,14 +477,19 @@ class Gearbox(ReprMixin):
         return tuple(name for name in at_work if name not in loaded and self.case.pairs[name].stiffness is None)
 
     @cached_property
+    def file_stiffness(self) -> dict[str, tuple[float, ...]]:
+        """Mesh stiffness that the file specifies by pair, N/m at equal distances over the mesh cycle."""
+        return gear_parts.stated_stiffness(self._origin)
+
+    @cached_property
     def stated_stiffness(self) -> dict[str, tuple[float, ...]]:
         """Mesh stiffness of the pairs that need no table, N/m at equal distances over the mesh cycle.
 
         The stiffness of the file has priority. A pair without torque has no loaded flank and therefore no table: it
         gets the mesh stiffness of loaded teeth according to ISO 6336-1, which is constant and causes no excitation.
         """
-        stated = gear_parts.stated_stiffness(self._origin)
-        return stated | {name: (iso6336.mesh_stiffness(self.gear_pairs[name]).stiffness,) for name in self.idle_pairs}
+        idle = {name: (iso6336.mesh_stiffness(self.gear_pairs[name]).stiffness,) for name in self.idle_pairs}
+        return self.file_stiffness | idle
 
     def table_distances(self, pair: str) -> tuple[float, ...]:
         """Centre distances (m) specified for the table of a pair with axes; none if they follow from the state.
@@ -485,124 +508,26 @@ class Gearbox(ReprMixin):
         return distances
 
 
-ALONE = ("bodies", "masses", "gears", "stiffness", "supports", "modifications", "pairs")
-"""Checks that remain meaningful if other entries of the file cannot be read."""
-
-
-def _checks_of_parts(gearbox: Gearbox) -> Iterator[checks.Check]:
-    case = gearbox.case
-    refuse = partial(_refuse, gearbox)
-    yield checks.Check("bodies", lambda: refuse(checks.errors_of_bodies(case)))
-    yield checks.Check("masses", lambda: refuse(checks.errors_of_mass_properties(case)))
-    yield checks.Check("gears", lambda: gearbox.gears)
-    yield checks.Check("stiffness", lambda: gear_parts.stated_stiffness(gearbox._origin))
-    yield checks.Check("supports", lambda: refuse(checks.errors_of_supports(case)))
-    yield checks.Check("places", lambda: _check_inertia_sets(gearbox), ("bodies", "masses"))
-    yield checks.Check("modifications", lambda: gearbox.modifications, ("gears",))
-    yield checks.Check("pairs", lambda: gearbox.gear_pairs, ("gears",))
-    yield checks.Check(
-        "ends", lambda: refuse(checks.errors_of_overall(case.overall, gearbox.spinning, case.gears)), ("places",)
-    )
-    for name, part in (
-        ("bearings", lambda: gearbox.bearings),
-        ("joints", lambda: gearbox.joints),
-        ("mounts", lambda: gearbox.mounts),
-        ("forces", lambda: gearbox.forces),
-        ("load cases", lambda: gearbox.load_cases),
-        ("pins", lambda: gearbox.pin_offsets),
-    ):
-        yield checks.Check(name, part, ("places",))
-    yield checks.Check("blanks", lambda: refuse(checks.errors_of_blanks(case)), ("bearings", "mounts", "forces"))
-    yield checks.Check("meshes", lambda: gearbox.meshes, ("places", "pairs"))
-    yield checks.Check("couplings", lambda: gearbox.couplings, ("bearings",))
-    yield checks.Check("deviations", lambda: gearbox.deviations, ("places", "gears"))
-
-
-def _checks_of_the_whole(gearbox: Gearbox) -> Iterator[checks.Check]:
-    case = gearbox.case
-    elements = ("meshes", "bearings", "mounts", "couplings", "forces")
-    for name, errors, needs in (
-        ("distances", lambda: checks.errors_of_centre_distances(gearbox.meshes, gearbox.named_bodies), ("meshes",)),
-        (
-            "planets",
-            lambda: checks.errors_of_planets(case, gearbox.bodies(), gearbox.gears, gearbox.meshes),
-            ("meshes",),
-        ),
-        (
-            "size",
-            lambda: checks.errors_of_size(len(gearbox.bodies()), sum(map(len, _elements(gearbox).values()))),
-            elements,
-        ),
-        (
-            "connection",
-            lambda: checks.errors_of_connection(
-                case, gearbox.bodies(), gearbox.meshes, gearbox.couplings, gearbox.held_by_torsion
-            ),
-            ("ends", "meshes", "couplings", "mounts"),
-        ),
-        (
-            "torsion",
-            lambda: checks.errors_of_torsion(gearbox.spinning, gearbox.couplings, gearbox.bearings),
-            ("couplings", "supports"),
-        ),
-        ("seals", lambda: checks.errors_of_seals(case, list(gearbox.named_bodies)), ("ends",)),
-        ("names", lambda: checks.errors_of_names(_elements(gearbox)), elements),
-        ("axes", lambda: checks.errors_of_joints(gearbox.joints, gearbox.named_bodies), ("joints",)),
-        (
-            "repetition",
-            lambda: checks.errors_of_repetition(case, gearbox.deviations, gearbox.pin_offsets),
-            ("deviations", "pins"),
-        ),
-        (
-            "output",
-            lambda: checks.errors_of_output_gear(case.overall, gearbox.gears, gearbox.bodies(), gearbox.couplings),
-            ("ends", "gears", "couplings"),
-        ),
-    ):
-        yield checks.Check(name, partial(_refuse_found, gearbox, errors), needs)
-    yield checks.Check("train", lambda: _check_train(gearbox), ("connection", "size", "load cases"))
-
-
-def _refuse_found(gearbox: Gearbox, find: Callable[[], Iterable[str]]) -> None:
-    _refuse(gearbox, find())
-
-
-def _refuse(gearbox: Gearbox, errors: Iterable[str]) -> None:
-    """Raise all errors together, one per line."""
-    lines = [line for text in errors for line in gearbox.error(text).errors]
-    if lines:
-        raise GearboxFileError(*lines)
-
-
-def _check_inertia_sets(gearbox: Gearbox) -> None:
-    _refuse(gearbox, checks.errors_of_inertia_sets(gearbox.case.default_inertias, gearbox.inertia_sets))
-    for inertias in gearbox.inertia_sets:
-        gearbox.bodies(inertias)
-
-
-def _check_train(gearbox: Gearbox) -> None:
-    """Check that the static load can be reacted and that the train has consistent kinematics from input to output."""
-    gearbox.train.static_mesh_forces()
-    if gearbox.gears and not gearbox.meshes:
-        raise gearbox.error("meshes: none is enabled; a gearbox with gears needs at least one")
-    _ = gearbox.train.ratio
-    for case in gearbox.load_cases.values():
+def _errors(gearbox: Gearbox, selected: Iterable[Check]) -> list[str]:
+    """Errors of checks in their order, without the checks whose prerequisites failed or were skipped."""
+    errors: list[str] = []
+    failed: set[str] = set()
+    for check in selected:
+        if failed & set(check.needs):
+            failed.add(check.name)
+            continue
         try:
-            gearbox.start_speeds(case)
+            if check.errors is None:
+                getattr(gearbox, check.name)
+                continue
+            parts = {name: getattr(gearbox, name) for name in inspect.signature(check.errors).parameters}
+            lines = [line for text in check.errors(**parts) for line in gearbox.error(text).errors]
         except GearboxFileError as error:
-            key = f"load_cases.{case.name}.start_speeds_rpm"
-            raise GearboxFileError(*(f"{line}; see {key}" for line in error.errors)) from None
-
-
-def _elements(gearbox: Gearbox) -> dict[str, Sequence[Mesh | Bearing | Coupling | PointForce]]:
-    """Parts that exert forces, by their table in the file."""
-    return {
-        "meshes": gearbox.meshes,
-        "bearings": gearbox.bearings,
-        "mounts": gearbox.mounts,
-        "couplings": gearbox.couplings,
-        "forces": gearbox.forces,
-    }
+            lines = list(error.errors)
+        if lines:
+            errors += lines
+            failed.add(check.name)
+    return errors
 
 
 def _makes_entry(content: Mapping[str, Any], dotted: str) -> bool:

@@ -73,8 +73,6 @@ def torque_series(gearbox: Gearbox, case: LoadCase) -> dict[str, tuple[Floats, F
     return series
 
 
-# Effect of a load case on the kinematic gear train: net torque, speeds, and loaded flanks of the meshes
-
 Series = Mapping[str, tuple[Floats, Floats]]
 BURSTING_RIM_SPEED = 300.0
 """Circumferential speed that no steel gear survives, m/s: density times its square is 0.7 GPa, the yield strength of
@@ -143,7 +141,7 @@ class LoadSummary(ReprMixin, line=" {name!r}: net torque {net_torque:g} N m, {st
     @property
     def fastest_rim(self) -> tuple[str, float]:
         """Body with the highest tip speed, and this speed, m/s; an empty name and zero for a rotor without gears."""
-        return max(self.rim_speeds.items(), key=lambda item: item[1], default=("", 0.0))
+        return max(self.rim_speeds.items(), key=lambda pair: pair[1], default=("", 0.0))
 
 
 def summarise_loads(
@@ -184,17 +182,26 @@ def summarise_loads(
     unit = np.array([rolling[name] for name in names])
     axial = _axial_inertias(gearbox, inertias)
     times = _instants(series, total)
-    torques = _torques(names, case, series, times)
+    torques = np.zeros((len(times), len(names)))
+    for name, torque in case.torques.items():
+        torques[:, names.index(name)] += torque
+    for name, (lines, values) in series.items():
+        torques[:, names.index(name)] += np.interp(times, lines, values)
     rates, added = _rates(gearbox, case, axial, torques)
     spins = _speeds(gearbox, case, times, rates)
     speeds = spins[:, names.index(reference)]
-    forces = _mesh_forces(gearbox, torques + added - rates * axial)
+    # Mesh forces F_bt (times, meshes) for balanced torques; of minimum norm if meshes share.
+    balanced = torques + added - rates * axial
+    solved = np.linalg.lstsq(gearbox.train.spin_rows.T, balanced.T, rcond=1e-12)[0]
+    forces: Floats = np.asarray(solved[: len(gearbox.meshes)].T)
     fastest = dict(zip(names, np.abs(spins).max(axis=0).tolist(), strict=True))
     flanks, reversed_flanks = _flanks(gearbox, forces)
+    net = float(torques[0] @ unit)
     return LoadSummary(
         name=case.name,
         inertia=float(axial @ unit**2),
-        net_torque=_without_round_off(float(torques[0] @ unit), torques[0] * unit),
+        # Round-off of the torques counts as zero.
+        net_torque=net if abs(net) > UNLOADED * float(np.abs(torques[0] * unit).max(initial=0.0)) else 0.0,
         driven=case.driven_body is not None,
         start_speed=case.start_speed,
         end_speed=float(speeds[-1]),
@@ -207,13 +214,6 @@ def summarise_loads(
         least_shares=_shares(gearbox, forces, min),
         greatest_shares=_shares(gearbox, forces, max),
     )
-
-
-def _without_round_off(total: float, parts: Floats) -> float:
-    """Return a sum, or zero if it is only round-off of its parts."""
-    if abs(total) > UNLOADED * float(np.abs(parts).max(initial=0.0)):
-        return total
-    return 0.0
 
 
 def load_warnings(loads: LoadSummary) -> tuple[str, ...]:
@@ -439,16 +439,6 @@ def _instants(series: Series, total: float) -> Floats:
     return np.unique(np.concatenate([np.linspace(0.0, total, INSTANTS), inside]))
 
 
-def _torques(names: tuple[str, ...], case: LoadCase, series: Series, times: Floats) -> Floats:
-    """Torques (times, bodies) on the rotating bodies, N m."""
-    torques = np.zeros((len(times), len(names)))
-    for name, torque in case.torques.items():
-        torques[:, names.index(name)] += torque
-    for name, (lines, values) in series.items():
-        torques[:, names.index(name)] += np.interp(times, lines, values)
-    return torques
-
-
 def _rates(gearbox: Gearbox, case: LoadCase, axial: Floats, torques: Floats) -> tuple[Floats, Floats]:
     """Angular accelerations (rad/s2) of the kinematic gear train and added machine torques (N m), both (times, bodies).
 
@@ -502,12 +492,6 @@ def drive_rate(gearbox: Gearbox, case: LoadCase) -> float:
 def driven_start_speed(gearbox: Gearbox, case: LoadCase) -> float:
     """Speed of the driven body at the start, rad/s; the load case specifies it at the overall input."""
     return gearbox.start_speeds(case)[str(case.driven_body)]
-
-
-def _mesh_forces(gearbox: Gearbox, applied: Floats) -> Floats:
-    """Mesh forces F_bt (times, meshes) for balanced torques (times, bodies); of minimum norm if meshes share."""
-    forces = np.linalg.lstsq(gearbox.train.spin_rows.T, applied.T, rcond=1e-12)[0]
-    return np.asarray(forces[: len(gearbox.meshes)].T)
 
 
 def _flanks(gearbox: Gearbox, forces: Floats) -> tuple[dict[str, str], tuple[str, ...]]:

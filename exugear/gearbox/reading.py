@@ -28,21 +28,27 @@ LONGEST_ERROR = 280
 """Maximum number of characters of an error after the name of the file."""
 
 
-class GearboxFileError(ValueError):
-    """A gearbox file that cannot be used; the message has one line per error with file, key, value and remedy.
+class ListedErrors(ValueError):
+    """Several errors of a file, one line each.
 
     Attributes
     ----------
     errors : tuple of str
-        All errors; the message shows the first `SHOWN_ERRORS`.
+        All errors; the message shows the first ones, at most `shown`.
     """
+
+    shown = SHOWN_ERRORS
 
     def __init__(self, *errors: str) -> None:
         self.errors = tuple(dict.fromkeys(errors))
-        more = len(self.errors) - SHOWN_ERRORS
+        more = len(self.errors) - self.shown
         many = "s" if more > 1 else ""
         rest = [f"and {more} more error{many}"] if more > 0 else []
-        super().__init__("\n".join([*self.errors[:SHOWN_ERRORS], *rest]))
+        super().__init__("\n".join([*self.errors[: self.shown], *rest]))
+
+
+class GearboxFileError(ListedErrors):
+    """A gearbox file that cannot be used; the message has one line per error with file, key, value and remedy."""
 
 
 def error_line(source: str, text: str) -> str:
@@ -161,7 +167,7 @@ def readable(content: Mapping[str, Any]) -> GearboxFile:
         pairs = found["pairs"].items()
         known = set(found["gears"])
         carriers = set(found["bodies"])
-        found["pairs"] = {name: one for name, one in pairs if not lost["gears"] or {one.pinion, one.gear} <= known}
+        found["pairs"] = {name: pair for name, pair in pairs if not lost["gears"] or {pair.pinion, pair.gear} <= known}
         broken = [
             pair for name, pair in written["pairs"].items() if name in lost["pairs"] and isinstance(pair, Mapping)
         ]
@@ -205,7 +211,9 @@ def _described(errors: list[Any], content: dict[str, Any]) -> Iterator[str]:
             meant.add((*error["loc"][:-1], renamed or _nearest(error["loc"])))
     for error in errors:
         path = _path(error["loc"], content)
-        key = ".".join(_key(part) for part in path)
+        key = ".".join(
+            (str(part) if re.fullmatch(r"[A-Za-z0-9_-]{1,60}", str(part)) else shortened(part)) for part in path
+        )
         if error["type"] == "too_short" and any(loc[:-1][: len(error["loc"])] == error["loc"] for loc in locations):
             continue  # the array is too short only because its entries are invalid
         if error["type"] == "missing":
@@ -250,9 +258,7 @@ def _remedy(error: Any) -> str:
         limit = error["ctx"].get("max_length", error["ctx"].get("min_length"))
         return f"must have {'at most' if error['type'] == 'too_long' else 'at least'} {limit} entries"
     if error["type"] == "string_pattern_mismatch":
-        if "x7f" in error["ctx"]["pattern"]:
-            return _NO_CONTROL
-        return _A_NAME
+        return _NO_CONTROL if "x7f" in error["ctx"]["pattern"] else _A_NAME
     if error["type"] in ("literal_error", "enum"):
         return one_of(error["ctx"]["expected"], error["input"])
     text = str(error["msg"]).removeprefix("Value error, ").replace("Input should", "must", 1)
@@ -284,9 +290,7 @@ def known_names(kind: str, names: Iterable[str], table: str) -> str:
     'the file has no pairs; add [pairs.p]'
     """
     listed = ", ".join(names)
-    if listed:
-        return f"{kind} are {listed}"
-    return f"the file has no {kind}; add [{table}]"
+    return f"{kind} are {listed}" if listed else f"the file has no {kind}; add [{table}]"
 
 
 def _path(location: tuple[int | str, ...], content: Any) -> tuple[int | str, ...]:
@@ -301,13 +305,6 @@ def _path(location: tuple[int | str, ...], content: Any) -> tuple[int | str, ...
         if inside or (number == len(location) - 1 and isinstance(content, Mapping) and part != "[key]"):
             path.append(part)
     return tuple(path)
-
-
-def _key(part: int | str) -> str:
-    """Part of a dotted key, in quotes if TOML requires them."""
-    if re.fullmatch(r"[A-Za-z0-9_-]{1,60}", str(part)):
-        return str(part)
-    return shortened(part)
 
 
 def shortened(value: Any, longest: int = 60) -> str:
@@ -326,17 +323,13 @@ def shortened(value: Any, longest: int = 60) -> str:
         text = "a table"
     else:
         text = repr(value[: longest + 1] if isinstance(value, str) else value)
-    if len(text) <= longest:
-        return text
-    return text[: longest - 1] + "…"
+    return text if len(text) <= longest else text[: longest - 1] + "…"
 
 
 def _nearest(location: tuple[int | str, ...]) -> str:
     """Known key with a name similar to an unknown one; empty for none."""
     near = difflib.get_close_matches(str(location[-1])[:100], _known_keys(location), n=1)
-    if near:
-        return near[0]
-    return ""
+    return near[0] if near else ""
 
 
 def _known_keys(location: tuple[int | str, ...]) -> list[str]:

@@ -175,9 +175,6 @@ def without_round_off(forces: Floats, largest_torque: float, smallest_radius: fl
     return np.where(np.abs(forces) > UNLOADED * largest_torque / smallest_radius, forces, 0.0)
 
 
-# A gear train: its rotations, kinematic constraints, rigid kinematics from input to output, and static mesh forces
-
-
 @dataclass(frozen=True, eq=False)
 class Train(
     ReprMixin, line=" from {input!r} to {output!r}: {spins!n} spins, {meshes!n} meshes, {couplings!n} couplings"

@@ -1,9 +1,10 @@
-"""Units of all files in SI units: a number times its unit, `MM * length_mm`. Keys end with their unit."""
+"""Units of all files in SI units: a number times its unit, `MM * length_mm`. Keys end with their unit; see `si`."""
 
 from __future__ import annotations
 
 import math
 import re
+from functools import cache
 from typing import Final, NamedTuple
 
 MM: Final = 1e-3
@@ -114,6 +115,32 @@ def unit_of_key(key: str) -> Unit | None:
     """
     suffix = unit_suffix(key)
     return UNITS[_without_blanks(suffix)] if suffix else None
+
+
+def si(section: object, key: str) -> float:
+    """Value of a key of a section of a file in SI units, according to the unit that the key ends with.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> gear = SimpleNamespace(face_width_mm=170.0, helix_angle_deg=14.0, tip_diameter_mm=None)
+    >>> si(gear, "face_width_mm"), round(si(gear, "helix_angle_deg"), 6), optional_si(gear, "tip_diameter_mm")
+    (0.17, 0.244346, None)
+    """
+    value: float = getattr(section, key)
+    return value * _factor(key)
+
+
+def optional_si(section: object, key: str) -> float | None:
+    """Value of an optional key in SI units, as `si` returns it; None if it is not specified."""
+    return None if getattr(section, key) is None else si(section, key)
+
+
+@cache
+def _factor(key: str) -> float:
+    unit = unit_of_key(key)
+    assert unit is not None, key
+    return unit.factor
 
 
 def _without_blanks(suffix: str) -> str:

@@ -142,8 +142,8 @@ class _RatedBearing:
             by_reference = np.sum(share / (1e6 * _interpolated(lives, radial)), axis=1)
         reference = float(by_reference.sum())
         static = max(
-            equivalent_static_load(rows, section.type, math.hypot(one[0], one[1]), abs(one[2]))
-            for one in worst.reshape(-1, 6)
+            equivalent_static_load(rows, section.type, math.hypot(load[0], load[1]), abs(load[2]))
+            for load in worst.reshape(-1, 6)
         )
         largest = float(np.hypot(worst[..., 0], worst[..., 1]).max())
         least = minimum_load(ratings.dynamic, section.type)
@@ -204,7 +204,7 @@ class _RatedBearing:
         pitch = rows[0].pitch_diameter
         limit = KN * (section.fatigue_load_limit_kN or 0.0) or fatigue_limit(ratings.static, pitch, section.type)
         clean = contamination_factor(oil.cleanliness, pitch)
-        ratios = np.array([viscosity_ratio(viscosity, float(one), pitch) for one in speed])
+        ratios = np.array([viscosity_ratio(viscosity, float(value), pitch) for value in speed])
         factors = [
             [life_factor(ratio, clean * limit / max(load, 1e-9), section.type) for load in row]
             for ratio, row in zip(ratios.tolist(), loads.tolist(), strict=True)

@@ -61,9 +61,9 @@ class DynamicFactor(ReprMixin):
     def at(self, speed: Floats) -> Floats:
         """Return the largest factor near each speed (rad/s); outside the speed range, the factor at its end."""
         found = np.empty(len(speed))
-        for place, one in enumerate(np.clip(np.abs(speed), self.speed[0], self.speed[-1])):
-            near = np.abs(self.speed - one) <= WITHIN * one
-            found[place] = self.value[near].max() if near.any() else np.interp(one, self.speed, self.value)
+        for place, value in enumerate(np.clip(np.abs(speed), self.speed[0], self.speed[-1])):
+            near = np.abs(self.speed - value) <= WITHIN * value
+            found[place] = self.value[near].max() if near.any() else np.interp(value, self.speed, self.value)
         return np.maximum(found, self.least)
 
     def largest(self, slowest: float, fastest: float) -> float:
@@ -154,8 +154,6 @@ def merged(parts: list[tuple[Floats, Floats]], least: float, source: str) -> Dyn
     order = np.argsort(speed)
     return DynamicFactor(speed[order], value[order], least, source)
 
-
-# Dynamic factor K_v from the source in the gearbox file: stated value, run, or steady-state response
 
 WINDOWS = 4
 """Number of windows at each speed, to include slow beats between meshes."""

@@ -19,7 +19,7 @@ import numpy as np
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.sections.loads import RatingSection, StrengthSection
-from exugear.gearbox.units import MPA, UM
+from exugear.gearbox.units import MPA, UM, si
 from exugear.gearbox.versions import LIFE
 from exugear.life.dynamic_factors import DynamicFactor
 from exugear.life.load_spectrum.counted import FLANKS, ToothExposure
@@ -46,7 +46,6 @@ from fe_ste.standards.pitting import (
     velocity_factor,
 )
 from fe_ste.standards.tooth_root import (
-    RootStressFactors,
     notch_factor,
     root_face_load_factor,
     root_stress_factors,
@@ -122,9 +121,9 @@ def check_strengths(
     """Refuse strengths of unknown gears, and alternating bending without Y_M; all errors are raised together."""
     errors: list[str] = []
     for name, strength in rating.gears.items():
-        flanks = {one.flank for one in teeth if one.gear == name}
+        flanks = {tooth.flank for tooth in teeth if tooth.gear == name}
         if not flanks:
-            known = ", ".join(sorted({one.gear for one in teeth}))
+            known = ", ".join(sorted({tooth.gear for tooth in teeth}))
             errors += gearbox.error(f"rating.gears.{name}: no gear of that name in a mesh; gears are {known}").errors
         elif (len(flanks) > 1 or reversed_too) and strength.mean_stress_factor is None:
             errors += gearbox.error(
@@ -209,9 +208,9 @@ def flank_lives(
                 case = _RatedTooth(
                     gearbox, rating, tooth, pair, balance, stresses[pair.name], dynamic[tooth.family], sense
                 )
-                one = case.life(acting)
-                lives.setdefault((one.gear, one.family, one.flank), []).append(one)
-    return tuple(worst_of(life) for life in lives.values())
+                rated = case.life(acting)
+                lives.setdefault((rated.gear, rated.family, rated.flank), []).append(rated)
+    return tuple(worst_of(planets) for planets in lives.values())
 
 
 LEAST_COUNTS = ("compression", "contact_limit", "root_limit")
@@ -220,10 +219,10 @@ LEAST_COUNTS = ("compression", "contact_limit", "root_limit")
 
 def worst_of(lives: Sequence[FlankLife]) -> FlankLife:
     """Return the worst of each value over the flanks of equal planets."""
-    contact = max(lives, key=lambda one: (np.nan_to_num(one.contact_damage, posinf=np.inf), one.contact_stress))
-    root = max(lives, key=lambda one: (np.nan_to_num(one.root_damage, posinf=np.inf), one.root_stress))
+    contact = max(lives, key=lambda life: (np.nan_to_num(life.contact_damage, posinf=np.inf), life.contact_stress))
+    root = max(lives, key=lambda life: (np.nan_to_num(life.root_damage, posinf=np.inf), life.root_stress))
     worst: dict[str, Any] = {}
-    for name in (one.name for one in fields(FlankLife) if one.type == "float"):
+    for name in (field.name for field in fields(FlankLife) if field.type == "float"):
         values = np.array([getattr(life, name) for life in lives])
         least = name.endswith(("_safety", "_static")) or name in LEAST_COUNTS
         worst[name] = float(values.min() if least else values.max())
@@ -316,12 +315,9 @@ class _RatedTooth:
             stress.at(stress.compression, 1.0, torque, tilt)[..., member],
         )
 
-    def _root_factors(self) -> RootStressFactors:
-        return root_stress_factors(self.pair, self.tooth.member, edition=self.rating.edition)
-
     def _nominal_root(self, force: float) -> float:
         area = self.pair.face_width * self.pair.pinion.normal_module
-        return force / area * self._root_factors().product
+        return force / area * root_stress_factors(self.pair, self.tooth.member, edition=self.rating.edition).product
 
     def _rated(
         self, hertz: Floats, root: Floats, cycles: Floats, speed: Floats, worst_hertz: float, worst_root: float
@@ -336,7 +332,7 @@ class _RatedTooth:
         contact, bending = life_curves(strength)
         allowed = self._contact_strength(strength, speed)[:, None, None]
         endured = root_strength(strength, self.pair, self.tooth.member)
-        static = MPA * strength.sigma_H_lim_MPa * contact.factors[0]
+        static = si(strength, "sigma_H_lim_MPa") * contact.factors[0]
         by_contact = damages(contact, hertz / allowed, 1.0, cycles).sum(axis=(1, 2))
         by_root = damages(bending, root, endured, cycles).sum(axis=(1, 2))
         values = (
@@ -379,8 +375,8 @@ class _RatedTooth:
         roughness = 0.5 * (roughness_of(strength) + roughness_of(mate))
         still = lubricant_factor(softer, self.gearbox.viscosity_40)
         still *= roughness_factor(softer, roughness, reduced_radius(self.pair))
-        moving = np.array([velocity_factor(softer, self._velocity(float(one))) for one in speed])
-        return MPA * strength.sigma_H_lim_MPa * still * moving
+        moving = np.array([velocity_factor(softer, self._velocity(float(value))) for value in speed])
+        return si(strength, "sigma_H_lim_MPa") * still * moving
 
     def _velocity(self, speed: float) -> float:
         """Return the pitch line velocity (m/s) at a speed (rad/s) of the loaded body."""
@@ -406,7 +402,7 @@ def root_factors(strength: StrengthSection, pair: GearPair, member: int) -> tupl
     notch = root_stress_factors(pair, member).notch
     return (
         notch_factor(notch, hardening),
-        surface_factor(UM * strength.root_roughness_Rz_um),
+        surface_factor(si(strength, "root_roughness_Rz_um")),
         size_factor(pair.pinion.normal_module, hardening),
     )
 
@@ -415,7 +411,7 @@ def root_strength(strength: StrengthSection, pair: GearPair, member: int) -> flo
     """Return the root strength (Pa) of a gear for a life factor of one."""
     both_ways = strength.mean_stress_factor or 1.0
     factors = math.prod(root_factors(strength, pair, member))
-    return MPA * strength.sigma_F_lim_MPa * PLAIN_TEST_GEAR * factors * both_ways
+    return si(strength, "sigma_F_lim_MPa") * PLAIN_TEST_GEAR * factors * both_ways
 
 
 def life_curves(strength: StrengthSection) -> tuple[LifeCurve, LifeCurve]:

@@ -27,8 +27,6 @@ from fe_ste.root_stress import MeshCycleStress
 from fe_ste.standards.iso6336 import outside_scope
 from fe_ste.tools.display import ReprMixin
 
-# Summary of a rating: parts that fail, parts below required values, and pairs that need relief
-
 LEAST_OUTSIDE = 0.01
 """Fraction of the load outside the path of contact below which no relief is recommended."""
 LARGEST_REACH = 2.5
@@ -170,8 +168,6 @@ def _relief_in_words(gearbox: Gearbox, name: str) -> str:
         return ""
     return f"{modification.tip_relief_um:g} µm of tip relief on {name}"
 
-
-# Rating and life of a gearbox under its load spectrum: gears by flank, bearings, extreme loads, limiting parts
 
 TOLD_SHARING = 1.0005
 """K_gamma of a single mesh above which it is reported, as rotor loads then change tooth forces."""
@@ -325,7 +321,7 @@ def compute_life(
         families.setdefault(mesh.family, []).append(number)
     hub = np.concatenate([acting.points.other, acting.worst_hub])
     sharing = {family: balance.load_sharing(numbers, acting.torques, hub) for family, numbers in families.items()}
-    told = {name: one for name, one in sharing.items() if len(families[name]) > 1 or one > TOLD_SHARING}
+    told = {name: value for name, value in sharing.items() if len(families[name]) > 1 or value > TOLD_SHARING}
     return Life(
         variant=str(assembly.variant),
         mesh_model=assembly.mesh_model,
@@ -363,7 +359,7 @@ def _unrated(assembly: Assembly, counted: CountedLoads, stresses: Mapping[str, M
     gearbox = assembly.gearbox
     lines = []
     rated = rating_of(gearbox).gears
-    for gear in dict.fromkeys(one.gear for one in counted.teeth):
+    for gear in dict.fromkeys(tooth.gear for tooth in counted.teeth):
         if gear not in rated:
             lines.append(f"gear {gear}: no strength; add [rating.gears.{gear}]")
     for pair in dict.fromkeys(mesh.pair.name for mesh in gearbox.meshes):
@@ -372,7 +368,7 @@ def _unrated(assembly: Assembly, counted: CountedLoads, stresses: Mapping[str, M
     for mesh in gearbox.meshes:
         if reason := outside_scope(mesh.pair):
             lines.append(f"{mesh.family}: no nominal stresses and no S_H and S_F to ISO 6336, {reason}")
-    for support in dict.fromkeys(one.family for one in assembly.supports if one.catalogue is None):
+    for support in dict.fromkeys(support.family for support in assembly.supports if support.catalogue is None):
         lines.append(f"{support}: defined by its stiffness only; add a [.catalogue] table for a rating life")
     if not assembly.supports:
         lines.append(f"bearings: the variant {assembly.variant} has none")
@@ -432,7 +428,8 @@ def _oil_in_words(oil: LubricantSection | None) -> str:
 def _dynamic_in_words(rating: RatingSection, dynamic: Mapping[str, DynamicFactor], acting: ActingLoads) -> str:
     if rating.dynamic_factor is not None:
         return f"K_v = {rating.dynamic_factor:g} for all meshes, as specified"
-    values = ", ".join(f"{name} {one.largest(acting.slowest, acting.fastest):.3f}" for name, one in dynamic.items())
+    factors = {name: factor.largest(acting.slowest, acting.fastest) for name, factor in dynamic.items()}
+    values = ", ".join(f"{name} {value:.3f}" for name, value in factors.items())
     first = next(iter(dynamic.values()))
     lowest = acting.slowest / RPM
     highest = acting.fastest / RPM

@@ -55,8 +55,8 @@ LISTS = ("assumptions", "unrated", "failures", "shortfalls", "reliefs")
 """Lists of sentences of a rating."""
 BEARING_UNITS = {"largest_load": "N", "equivalent": "N", "basic_hours": "h", "reference_hours": "h", "pressure": "Pa"}
 BEARING_UNITS |= {"modified_hours": "h", "minimum_load": "N"}
-FLANK_NUMBERS = tuple(one.name for one in fields(FlankLife) if one.type in (float, "float"))
-BEARING_NUMBERS = tuple(one.name for one in fields(BearingLife) if one.type in (float, "float"))
+FLANK_NUMBERS = tuple(field.name for field in fields(FlankLife) if field.type in (float, "float"))
+BEARING_NUMBERS = tuple(field.name for field in fields(BearingLife) if field.type in (float, "float"))
 _LAYOUT = Layout(
     "life",
     LIFE,
@@ -170,7 +170,7 @@ def limits(dataset: xr.Dataset) -> list[tuple[str, str, float]]:
     for kind, (name, key, _) in DAMAGES.items():
         values = dataset[f"{name}_{key}"].to_numpy().tolist()
         found += [(part, kind, value) for part, value in zip(dataset[name].to_numpy().tolist(), values, strict=True)]
-    return sorted((one for one in found if not math.isnan(one[2])), key=lambda one: -one[2])
+    return sorted((row for row in found if not math.isnan(row[2])), key=lambda row: -row[2])
 
 
 def summary(dataset: xr.Dataset) -> dict[str, Any]:
@@ -193,9 +193,7 @@ def summary(dataset: xr.Dataset) -> dict[str, Any]:
 
 
 def _number(value: float) -> float | str:
-    if math.isinf(value):
-        return INFINITE
-    return value
+    return INFINITE if math.isinf(value) else value
 
 
 def _entries(dataset: xr.Dataset, name: str, numbers: Sequence[str]) -> Iterator[Mapping[str, Any]]:
@@ -204,9 +202,6 @@ def _entries(dataset: xr.Dataset, name: str, numbers: Sequence[str]) -> Iterator
         words = FLANK_WORDS if name == "flank" else ()
         told = {key: str(dataset[f"{name}_{key}"].sel({name: label}).item()) for key in words}
         yield {name: label, **told, **{key: _number(value) for key, value in given if not math.isnan(value)}}
-
-
-# Ratings in a results folder that belong to its gearbox file
 
 
 @dataclass(frozen=True)

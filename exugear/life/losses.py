@@ -19,7 +19,7 @@ import scipy.optimize
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import summarise_loads
 from exugear.gearbox.parts import Mesh
-from exugear.gearbox.units import MM, RPM, UM
+from exugear.gearbox.units import MM, RPM, UM, si
 from exugear.life.gear_life import RZ_OF_RA, roughness_of
 from exugear.life.power_flow import power_flow
 from exugear.system.bearings.duty import BearingLoadState
@@ -145,7 +145,7 @@ class Losses:
     def total(self) -> float:
         """All losses that are included, W."""
         meshes = sum(mesh.loss for mesh in self.meshes)
-        return meshes + sum(own.loss for own in self.bearings) + sum(seal.loss for seal in self.seals)
+        return meshes + sum(bearing.loss for bearing in self.bearings) + sum(seal.loss for seal in self.seals)
 
     @property
     def band(self) -> tuple[float, float]:
@@ -226,7 +226,12 @@ def _at_temperature(
     known = {duty.name for duty in duties}
     meshes = _mesh_losses(gearbox, tables, speeds, kinematic * density)
     bearings = _bearing_losses(gearbox, duties, speeds, kinematic)
-    seals = _seal_losses(gearbox, speeds)
+    found = []
+    for name, seal in gearbox.case.seals.items():
+        relative = abs(speeds.get(seal.body, 0.0) - speeds.get(seal.on, 0.0))
+        loss = SEAL_LOSS * seal.diameter_mm**2 * relative / RPM
+        found.append(SealLoss(name, si(seal, "diameter_mm"), relative, loss))
+    seals = tuple(found)
     shares = {mesh.family: mesh.friction * mesh.loss_factor for mesh in meshes}
     flow = power_flow(
         gearbox.train,
@@ -265,9 +270,11 @@ def _drags(
 ) -> dict[str, float]:
     """Torques of bearings and seals on both of their bodies, N m."""
     supports = {support.name: support for support in gearbox.bearings}
-    own = {bearing.family: bearing.loss / bearing.count for bearing in bearings}
+    single = {bearing.family: bearing.loss / bearing.count for bearing in bearings}
     losses = [
-        (supports[duty.name].body, supports[duty.name].on, own[duty.family]) for duty in duties if duty.name in supports
+        (supports[duty.name].body, supports[duty.name].on, single[duty.family])
+        for duty in duties
+        if duty.name in supports
     ]
     losses += [(gearbox.case.seals[seal.name].body, gearbox.case.seals[seal.name].on, seal.loss) for seal in seals]
     drags: dict[str, float] = {}
@@ -348,30 +355,14 @@ def _bearing_losses(
             moments = np.full(3, moment)
         else:
             series = friction_series(section)
-            moments = sum(
-                (
-                    np.array(
-                        frictional_moment(
-                            section, duty.radial_load, duty.axial_load, relative, viscosity, duty.ratings.static
-                        )
-                    )
-                    for duty in members
-                ),
-                np.zeros(3),
-            )
+            moments = np.zeros(3)
+            for duty in members:
+                load = (duty.radial_load, duty.axial_load)
+                moments += frictional_moment(section, *load, relative, viscosity, duty.ratings.static)
         loss, low, high = (moments * relative).tolist()
         largest = max(map(_equivalent_load, members))
         ratio = largest / members[0].ratings.dynamic
         found.append(BearingLoss(family, len(members), largest, ratio, relative, series, loss, (low, high)))
-    return tuple(found)
-
-
-def _seal_losses(gearbox: Gearbox, speeds: Mapping[str, float]) -> tuple[SealLoss, ...]:
-    found = []
-    for name, seal in gearbox.case.seals.items():
-        relative = abs(speeds.get(seal.body, 0.0) - speeds.get(seal.on, 0.0))
-        loss = SEAL_LOSS * seal.diameter_mm**2 * relative / RPM
-        found.append(SealLoss(name, MM * seal.diameter_mm, relative, loss))
     return tuple(found)
 
 

@@ -89,11 +89,11 @@ class StaticBalance(ReprMixin, line=": {torque!n} torques, {angle!n} angles, lin
         found = np.zeros((len(torque), *values.shape[1:]))
         for sign in (1.0, -1.0):
             wanted = torque >= 0.0 if sign > 0.0 else torque < 0.0
-            own = np.sign(self.torque) == sign
-            if not own.any():
-                own = ~own  # linear models are solved at one torque, of either sign
-            flat = values[own].reshape(int(own.sum()), -1)
-            inside = np.array([np.interp(torque[wanted], self.torque[own], column) for column in flat.T]).T
+            same_sense = np.sign(self.torque) == sign
+            if not same_sense.any():
+                same_sense = ~same_sense  # linear models are solved at one torque, of either sign
+            flat = values[same_sense].reshape(int(same_sense.sum()), -1)
+            inside = np.array([np.interp(torque[wanted], self.torque[same_sense], column) for column in flat.T]).T
             found[wanted] = inside.reshape(-1, *values.shape[1:])
         return found
 
@@ -110,10 +110,10 @@ class StaticBalance(ReprMixin, line=": {torque!n} torques, {angle!n} angles, lin
         """
         if torque is None:
             torque = self.torque[[np.abs(self.torque).argmax()]]
-        own = list(meshes)
-        forces = np.abs(self.at(self.mesh_force, torque, hub)[..., own]).max(axis=(1, 2))
+        names = list(meshes)
+        forces = np.abs(self.at(self.mesh_force, torque, hub)[..., names]).max(axis=(1, 2))
         worst = int(forces.argmax())
-        mean = float(np.abs(self.at(self.mesh_force, torque[[worst]])[..., own]).mean())
+        mean = float(np.abs(self.at(self.mesh_force, torque[[worst]])[..., names]).mean())
         if mean:
             return float(forces[worst]) / mean
         return 1.0
@@ -187,11 +187,14 @@ def static_balance(
     linear = is_linear(assembly)
     sizes = np.zeros(5) if hub is None else hub
     solved = _torques(torques, linear)
-    turns = _angles(assembly, angles)
+    places = angles if _carrier(assembly) else 1
+    turns: Floats = np.asarray(2.0 * math.pi / places * np.arange(places))
     wrenches = _wrenches(assembly, body, sizes)
     found: list[States] = []
+    total = len(turns) * len(solved)
+    report = progress or (lambda done, total: None)
     for number, turn in enumerate(turns):
-        count = partial(_report_progress, progress, number * len(solved), len(turns) * len(solved))
+        count = partial(lambda before, done: report(before + done, total), number * len(solved))
         states = None if store is None else store.stored(number)
         if states is None:
             states = _solve_angle(assembly, body, solved, float(turn), wrenches, count)
@@ -203,11 +206,6 @@ def static_balance(
     left = np.any([states.outside for states in found], axis=(0, 1, 2))
     outside = tuple(np.array(assembly.mesh_names)[left].tolist())
     return StaticBalance(solved, turns, force, misalignment, load, tilt, linear, outside)
-
-
-def _report_progress(progress: Callable[[int, int], None] | None, before: int, total: int, done: int) -> None:
-    if progress is not None:
-        progress(before + done, total)
 
 
 def _solve_angle(
@@ -227,25 +225,20 @@ def _solve_angle(
         count(done)
         torque = float(torques[t])
         known = before[math.copysign(1.0, torque)]  # a torque of opposite sign loads other flanks
-        q = _static_coordinates(assembly, body, torque, about, None, _ahead(known, torque))
+        near = known[-1][1] if known else None
+        if len(known) > 1:  # extrapolate the last two states
+            (first, q_first), (second, q_second) = known[-2:]
+            near = q_second + (q_second - q_first) * (torque - second) / (second - first)
+        q = _static_coordinates(assembly, body, torque, about, None, near)
         alone = States.of(assembly, q)
-        beside = (
-            None if wrench is None else _static_coordinates(assembly, body, torque, about, wrench, q)
-            for wrench in wrenches
-        )
-        rows[t] = [alone, *(alone if one is None else States.of(assembly, one) for one in beside)]
+        rows[t] = [alone]
+        for wrench in wrenches:
+            if wrench is None:
+                rows[t].append(alone)
+            else:
+                rows[t].append(States.of(assembly, _static_coordinates(assembly, body, torque, about, wrench, q)))
         known.append((torque, q))
-    return States(*(np.array([[one[key] for one in row] for row in rows]) for key in range(len(States._fields))))
-
-
-def _ahead(known: Sequence[tuple[float, Floats]], torque: float) -> Floats | None:
-    """Return start coordinates for a torque: extrapolated from the last two states, or the last state."""
-    if len(known) < 2:
-        if known:
-            return known[-1][1]
-        return None
-    (first, one), (second, other) = known[-2:]
-    return np.asarray(other + (other - one) * (torque - second) / (second - first))
+    return States(*(np.array([[state[key] for state in row] for row in rows]) for key in range(len(States._fields))))
 
 
 def _static_coordinates(
@@ -316,12 +309,6 @@ def _carrier(assembly: Assembly) -> str | None:
     return next((name for name in carriers if not bodies[name].fixed), None)
 
 
-def _angles(assembly: Assembly, count: int) -> Floats:
-    if _carrier(assembly) is None:
-        return np.zeros(1)
-    return np.asarray(2.0 * math.pi / count * np.arange(count))
-
-
 def _inner_rings(assembly: Assembly, q: Floats) -> tuple[Floats, Floats]:
     """Return load (bearings, 6) and tilt (bearings, 2) of inner rings, in the axes of the supporting body."""
     if not assembly.supports:
@@ -329,7 +316,7 @@ def _inner_rings(assembly: Assembly, q: Floats) -> tuple[Floats, Floats]:
     loads = assembly.bearing_loads(q, np.zeros_like(q))
     strains = assembly.support_strains(q)
     # The bearing has its factor's fraction of the deflection, the seat the rest; outer rings move the opposite way.
-    scales = np.array([one.factor * (-1.0 if one.carries_outer_ring else 1.0) for one in assembly.supports])
+    scales = np.array([support.factor * (-1.0 if support.carries_outer_ring else 1.0) for support in assembly.supports])
     turned = np.empty_like(loads)
     for number, support in enumerate(assembly.supports):
         angle = float(q[assembly.spin[support.on]]) if support.on in assembly.spin else 0.0
@@ -414,8 +401,8 @@ class ActingLoads:
         """Return the torques of one sign, including the points, with their rotor loads."""
         torque = self.torques
         hub = np.concatenate([self.points.other, self.worst_hub])
-        own = torque * sense > 0.0
-        return torque[own], hub[own]
+        same_sense = torque * sense > 0.0
+        return torque[same_sense], hub[same_sense]
 
     def sum_by_bin(self, values: Floats) -> Floats:
         """Sum values of points (points,) into the bins of the distribution, (bins,)."""
@@ -460,9 +447,7 @@ def life_requests(assembly: Assembly, counted: CountedLoads, folder: Path) -> li
     """
     grid = LAWS[assembly.mesh_model].needs_axes
     requests = requested_tables(assembly.gearbox, folder, grid=grid)
-    if grid:
-        return requests
-    return stress_requests(assembly, requests, counted, folder)
+    return requests if grid else stress_requests(assembly, requests, counted, folder)
 
 
 def stress_requests(
@@ -546,7 +531,7 @@ def _wider(
         misalignment=tuple(_rounded(node / width) for node in nodes),
     )
     path = folder / "stress" / f"{request.name}.states.nc"
-    return TableRequest(request.name, wanted, path, _stored(path, wanted))
+    return TableRequest(request.name, wanted, path, stored_table(path, wanted))
 
 
 def _ends(openings: Sequence[float]) -> tuple[float, float]:
@@ -561,7 +546,8 @@ def _nodes(begin: float, end: float) -> list[float]:
     return [begin + (end - begin) * step / steps for step in range(1, steps + 1)]
 
 
-def _stored(path: Path, wanted: TableInput) -> MeshTable | None:
+def stored_table(path: Path, wanted: TableInput) -> MeshTable | None:
+    """Read the table of an input; None if the file is missing, damaged, or of another input."""
     try:
         return MeshTable.open(path, wanted)
     except TableError:

@@ -24,8 +24,6 @@ from exugear.system.tooth_mesh.contact_state import MeshLoadState
 from fe_ste.tools.files import FileError, append_line, read_text, write_file
 from fe_ste.tools.stores import Layout, open_dataset
 
-# The results folder: its gearbox file, whether a file belongs to it, and run times
-
 CASE_FILE = "case.json"
 TIMES_FILE = "times.jsonl"
 REPORT_FILE = "report.html"

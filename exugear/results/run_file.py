@@ -37,8 +37,6 @@ from fe_ste.tools.stores import ErrorKeeper, Layout, load_dataset, open_sealed, 
 if TYPE_CHECKING:
     import xarray as xr
 
-# Variables in the files of a run: its signals, and the state from which it is resumed
-
 STATE = (
     Variable("state_q", ("coordinate",), "m or rad"),
     Variable("state_v", ("coordinate",), "m/s or rad/s"),
@@ -53,9 +51,6 @@ VARIABLES = {variable.name: variable for variable in (*(signal for signal in SIG
 """All variables by name, in the order of the file; a run contains those of its mesh model."""
 GROWING = ("time", "balance_time")
 """Dimensions along which the pieces of a run are appended."""
-
-
-# A run that is in progress or was stopped: a folder of pieces, each with the state from which it is resumed
 
 _PIECE_NAME = re.compile(r"\d{6}\.npz")
 _log = logging.getLogger(__name__)
@@ -295,8 +290,6 @@ def discard_pieces(folder: Path, keep: Iterable[Path] = ()) -> None:
             os.rmdir(folder)
 
 
-# The file of a run: it is written along with the pieces of the run; complete and incomplete runs can be read
-
 FINAL_NAME = "run.nc"
 PARTIAL_NAME = "run.partial"
 """Folder with the pieces of an incomplete run."""
@@ -513,9 +506,7 @@ def _load_pieces(folder: Path, wanted: list[str] | None) -> xr.Dataset:
             values = np.concatenate(parts[name]) if growing else parts[name][-1]
             data[name] = (variable.dimensions, values, variable.attributes)
     _LAYOUT.check(data, folder)
-    if wanted is None:
-        return data
-    return data[wanted]
+    return data if wanted is None else data[wanted]
 
 
 def invalidity_of(attributes: Mapping[str, Any]) -> str:

@@ -96,27 +96,27 @@ def compare_solvers(path: Path, exudyn_path: Path) -> SolverComparison:
     FileError
         A file is missing or damaged, or the runs are not of the same input and solver pair.
     """
-    own = load_run(path)
+    compiled = load_run(path)
     other = load_run(exudyn_path)
-    if own.attrs["input_hash"] != other.attrs["input_hash"]:
+    if compiled.attrs["input_hash"] != other.attrs["input_hash"]:
         raise FileError(f"{exudyn_path}: was computed from another input than {path.name}; compare with Exudyn again")
-    if not str(other.attrs["solver"]).startswith("Exudyn") or str(own.attrs["solver"]).startswith("Exudyn"):
+    if not str(other.attrs["solver"]).startswith("Exudyn") or str(compiled.attrs["solver"]).startswith("Exudyn"):
         raise FileError(f"{exudyn_path}: requires a run of the compiled solver and one of Exudyn")
-    count = min(own.sizes["time"], other.sizes["time"])
-    own = own.isel(time=slice(count))
+    count = min(compiled.sizes["time"], other.sizes["time"])
+    compiled = compiled.isel(time=slice(count))
     other = other.isel(time=slice(count))
-    if count == 0 or not np.allclose(own["time"], other["time"], rtol=1e-9):
+    if count == 0 or not np.allclose(compiled["time"], other["time"], rtol=1e-9):
         raise FileError(f"{exudyn_path}: has other sample times than {path.name}; compare with Exudyn again")
     difference = {}
     for name in COMPARED:
-        if name in own and own[name].size:
+        if name in compiled and compiled[name].size:
             scale = max(float(np.abs(other[name]).max()), np.finfo(float).tiny)
-            difference[name] = float(np.abs(own[name] - other[name]).max()) / scale
+            difference[name] = float(np.abs(compiled[name] - other[name]).max()) / scale
     return SolverComparison(
         exudyn=str(other.attrs["solver"]),
-        compiled=str(own.attrs["solver"]).removeprefix("compiled, "),
+        compiled=str(compiled.attrs["solver"]).removeprefix("compiled, "),
         duration=float(other["time"][-1]),
         difference=difference,
-        time=own["time"].to_numpy(),
-        overall=(own["overall_dte"].to_numpy(), other["overall_dte"].to_numpy()),
+        time=compiled["time"].to_numpy(),
+        overall=(compiled["overall_dte"].to_numpy(), other["overall_dte"].to_numpy()),
     )

@@ -41,8 +41,6 @@ from fe_ste.tools.threads import side_by_side
 if TYPE_CHECKING:
     import xarray as xr
 
-# Modes followed over speed: which mode at one speed is which at the next
-
 Found: TypeAlias = tuple[Complexes, Complexes, Complexes]
 """Eigenvalues (n,), right and left shapes (n, 2 size), as `exugear.steady.mean_system.mean_system` gives them."""
 CLEAR = 0.8
@@ -136,7 +134,7 @@ def _matches(one: Found, other: Found) -> tuple[Integers, Integers, Floats]:
 def _clarity(one: Found, other: Found, narrowest: float) -> float:
     """Minimum MAC for modes to be matched across a step, or less than `CLEAR` where a veering may be hidden in it."""
     rows, columns, values = _matches(one, other)
-    before, after = (own[0][places].imag for own, places in ((one, rows), (other, columns)))
+    before, after = (modes[0][places].imag for modes, places in ((one, rows), (other, columns)))
     far = np.triu(np.subtract.outer(before, before), 1)
     near = np.triu(np.subtract.outer(after, after), 1)
     first, second = np.nonzero(far * near < 0.0)
@@ -145,22 +143,20 @@ def _clarity(one: Found, other: Found, narrowest: float) -> float:
     share = 2.0 * np.sqrt(cross) / (1.0 / apart[0] + 1.0 / apart[1]) / (apart[0] + apart[1])
     hidden = share[share > narrowest].max(initial=0.0)
     clear = float(values.min(initial=1.0))
-    if hidden:
-        return min(clear, CLEAR * (1.0 - min(1.0, float(hidden))))
-    return clear
+    return min(clear, CLEAR * (1.0 - min(1.0, float(hidden)))) if hidden else clear
 
 
 def _joined(speeds: Floats, found: list[Found]) -> ModeTracks:
     """Tracks from modes at each speed, in the order of their mean frequency."""
     places = [list(range(len(found[0][0])))]
     count = len(found[0][0])
-    for one, other in itertools.pairwise(found):
-        rows, columns, _ = _matches(one, other)
-        own = dict(zip(columns.tolist(), (places[-1][row] for row in rows), strict=True))
-        new = [n for n in range(len(other[0])) if n not in own]
-        own |= {n: count + number for number, n in enumerate(new)}
+    for before, after in itertools.pairwise(found):
+        rows, columns, _ = _matches(before, after)
+        tracks = dict(zip(columns.tolist(), (places[-1][row] for row in rows), strict=True))
+        new = [n for n in range(len(after[0])) if n not in tracks]
+        tracks |= {n: count + number for number, n in enumerate(new)}
         count += len(new)
-        places.append([own[n] for n in range(len(other[0]))])
+        places.append([tracks[n] for n in range(len(after[0]))])
     size = found[0][1].shape[1] // 2
     eigenvalues = np.full((len(speeds), count), complex(np.nan, np.nan))
     shapes, partners = np.zeros((2, len(speeds), count, size), dtype=np.complex128)
@@ -170,7 +166,7 @@ def _joined(speeds: Floats, found: list[Found]) -> ModeTracks:
     return ModeTracks(speeds, eigenvalues[:, order], shapes[:, order], partners[:, order])
 
 
-# What modes of the mean system are: types of planetary sets, who moves how in words, the sense of a whirl
+# Description of modes: types of planetary sets, moving parts, whirl
 
 KINDS = ("rotational", "translational", "planet")
 """Types of modes of a planetary set."""
@@ -211,7 +207,7 @@ class ModeNamer:
         self.assembly, self._turn = frame.assembly, frame.matrices(0.0)[0]
         self._q = frame.state(0.0, speed, system.static_at(speed))[0]
         self._elements = linearise(self.assembly, self._q, frame.mean_meshes).stiffness
-        self._senses = {name: float(np.sign(own * speed)) for name, own in frame.speeds.items()}
+        self._senses = {name: float(np.sign(ratio * speed)) for name, ratio in frame.speeds.items()}
 
     def named(self, shape: Complexes) -> NamedMode:
         """Name a shape (size,) of the averaged system."""
@@ -235,19 +231,15 @@ class ModeNamer:
             return float(circling / total)
         return 0.0
 
-    def _parts(self, shape: Complexes) -> tuple[tuple[Floats, float], ...]:
-        """Real and imaginary part of a shape with the share of its energy that each has."""
+    def _kinetic(self, shape: Complexes) -> Floats:
+        """Share of kinetic energy (bodies, motions) of the real and imaginary part, weighted by their energy."""
         parts = (shape.real, shape.imag)
         energies = [float(part @ self.system.mass @ part) for part in parts]
-        return tuple(
-            (part, energy / sum(energies)) for part, energy in zip(parts, energies, strict=True) if energy > 0.0
-        )
-
-    def _kinetic(self, shape: Complexes) -> Floats:
-        """Share of kinetic energy (bodies, motions)."""
         shares = np.zeros((len(self.assembly.bodies), len(BODY_MOTIONS)))
-        for part, weight in self._parts(shape):
-            shares += weight * kinetic_shares(self.assembly, (self._turn @ part)[:, None], self._q)[0]
+        for part, energy in zip(parts, energies, strict=True):
+            if energy > 0.0:
+                moved = (self._turn @ part)[:, None]
+                shares += energy / sum(energies) * kinetic_shares(self.assembly, moved, self._q)[0]
         return shares
 
     def _words(self, shape: Complexes, kinetic: Floats) -> str:
@@ -265,35 +257,28 @@ class ModeNamer:
             return ""
         most = int(np.argmax(own))
         kind = KINDS[most] if own[most] >= OF_KIND * own.sum() else MIXED
-        if len(sets) == 1:
-            return kind
-        return f"{kind} of {planets.carrier}"
+        return kind if len(sets) == 1 else f"{kind} of {planets.carrier}"
 
     def _motion_shares(self, planets: PlanetSet, shape: Complexes, kinetic: Floats) -> tuple[float, Floats]:
         """Share of the planets of a set, and shares (3,) of the set by type of motion."""
         places = {body.name: n for n, body in enumerate(self.assembly.bodies)}
-        waves = np.array([self._wave_energy(name, shape) for name in planets.names])
+        # The coordinates of planet n hold multi-blade component n.
+        energies = []
+        for name in planets.names:
+            index = [i for i in self.assembly.coordinates[name] if i >= 0]
+            motion = shape[index]
+            energies.append(float((motion.conj() @ self.system.mass[np.ix_(index, index)] @ motion).real))
+        waves = np.array(energies)
         by_kind = np.array([waves[0], waves[1:3].sum(), waves[3:].sum()])
         of_planets = float(sum(kinetic[places[name]].sum() for name in planets.names))
         shares = of_planets * by_kind / max(float(by_kind.sum()), 1e-300)
-        for name in self._central(planets):
+        meshing = [{element.mesh.pinion, element.mesh.gear} for element in self.assembly.elements]
+        central = {planets.carrier}.union(*(ends for ends in meshing if ends & set(planets.names)))
+        for name in central - set(planets.names):
             if name in places:
                 turning = float(kinetic[places[name], TURNING].sum())
                 shares[:2] += turning, float(kinetic[places[name]].sum()) - turning
         return of_planets, shares
-
-    def _wave_energy(self, slot: str, shape: Complexes) -> float:
-        """Kinetic energy of the multi-blade component in the coordinates of a planet."""
-        index = [i for i in self.assembly.coordinates[slot] if i >= 0]
-        own = shape[index]
-        return float((own.conj() @ self.system.mass[np.ix_(index, index)] @ own).real)
-
-    def _central(self, planets: PlanetSet) -> set[str]:
-        """Bodies that carry the planets or mesh with them."""
-        meshes = (element.mesh for element in self.assembly.elements)
-        ends = [{mesh.pinion, mesh.gear} for mesh in meshes]
-        own = set(planets.names)
-        return {planets.carrier}.union(*(pair for pair in ends if pair & own)) - own
 
 
 def circle(x: complex, y: complex) -> float:
@@ -306,8 +291,6 @@ def circle(x: complex, y: complex) -> float:
     """
     return float(0.0 - 2.0 * (np.conj(x) * y).imag)
 
-
-# Campbell diagram of a mean system: eigenfrequencies and damping over speed, each mode named, and read from a file
 
 LAYOUT: dict[str, tuple[str, ...]] = {
     "campbell_speed": ("campbell_point",),
@@ -358,7 +341,7 @@ class Campbell(ReprMixin, line=": {names!n} modes at {speeds!n} speeds"):
             "mode_kind": (np.array(self.kinds, dtype=object), {}),
             "mode_name": (np.array(self.names, dtype=object), {}),
         }
-        return {name: (LAYOUT[name], own, attributes) for name, (own, attributes) in values.items()}
+        return {name: (LAYOUT[name], array, attributes) for name, (array, attributes) in values.items()}
 
 
 def modes_over_speed(system: MeanSystem, low: float, high: float, highest: float) -> ModeTracks:
@@ -386,8 +369,8 @@ def campbell_of(system: MeanSystem, tracks: ModeTracks) -> Campbell:
         tracks.frequency,
         tracks.damping,
         whirl,
-        tuple(own.kind for own in named),
-        tuple(own.name for own in named),
+        tuple(mode.kind for mode in named),
+        tuple(mode.name for mode in named),
     )
 
 

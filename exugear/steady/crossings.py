@@ -174,7 +174,7 @@ def missed_tops(
             (point, line) for line in range(highest.shape[1]) for point in standing_peaks(highest[:, line], LEAST_STAND)
         ]
         peaks.sort(key=lambda peak: -highest[peak])
-        loudest = dict.fromkeys(peaks[:LOUDEST]) | dict.fromkeys([own for own in peaks if inside[own[0]]][:LOUDEST])
+        loudest = dict.fromkeys(peaks[:LOUDEST]) | dict.fromkeys([peak for peak in peaks if inside[peak[0]]][:LOUDEST])
         for point, line in loudest:
             around = slice(max(point - NEIGHBOURS, 0), point + NEIGHBOURS + 1)
             if not smooth[around].all():
@@ -223,11 +223,11 @@ def _peak(model: HarmonicBalanceModel, tracks: ModeTracks, mode: int, speed: flo
 
     Signals are the overall transmission error and the deflections of the meshes.
     """
-    own = _followed(model.system, tracks, mode, speed)
+    followed = _followed(model.system, tracks, mode, speed)
     ports = model.ports_at(speed)
     rows = np.vstack([model.row_of_overall(speed)[None], ports.readings[:, DEFLECTION]])
-    pushed = abs(own.left @ (model.loads(ports) @ force.ravel()))
-    return np.asarray(np.abs(rows @ own.shape) * pushed / abs(own.value.real))
+    pushed = abs(followed.left @ (model.loads(ports) @ force.ravel()))
+    return np.asarray(np.abs(rows @ followed.shape) * pushed / abs(followed.value.real))
 
 
 def _met(system: MeanSystem, tracks: ModeTracks, orders: Floats, near: Crossing) -> Crossing:
@@ -238,14 +238,14 @@ def _met(system: MeanSystem, tracks: ModeTracks, orders: Floats, near: Crossing)
     order = float(orders[near.line])
     at = near.speed
     start = _followed(system, tracks, near.mode, at)
-    own = Mode(complex(start.value.real, order * abs(at)), start.shape, start.left)
+    mode = Mode(complex(start.value.real, order * abs(at)), start.shape, start.left)
     for _ in range(ROUNDS):
-        own = improved(own, system.mass, system.damping_at(at), system.stiffness_at(at))
-        at = float(np.copysign(own.value.imag / order, at))
-    if start.assurance(own, system.mass, system.damping_at(at)) < SAME:
+        mode = improved(mode, system.mass, system.damping_at(at), system.stiffness_at(at))
+        at = float(np.copysign(mode.value.imag / order, at))
+    if start.assurance(mode, system.mass, system.damping_at(at)) < SAME:
         return near
-    damping = float(-own.value.real / abs(own.value))
-    return replace(near, speed=at, frequency=own.value.imag / 2.0 / np.pi, damping=damping)
+    damping = float(-mode.value.real / abs(mode.value))
+    return replace(near, speed=at, frequency=mode.value.imag / 2.0 / np.pi, damping=damping)
 
 
 def improved(mode: Mode, mass: Floats, damping: Floats, stiffness: Floats) -> Mode:
@@ -265,7 +265,7 @@ def improved(mode: Mode, mass: Floats, damping: Floats, stiffness: Floats) -> Mo
     return Mode(value, right, left)
 
 
-# What makes a peak: which mesh's error excites it, which mode carries it, and what would lower it, in percent
+# Cause of a peak: exciting mesh, mode, and sensitivity
 
 LEAST_MODE = 0.01
 """Minimum share of a mode to be reported."""
@@ -359,7 +359,7 @@ def _modes(
         part = shape * (partner @ pushed) / (1j * frequency - value)
         part += np.conj(shape) * (partner.conj() @ pushed) / (1j * frequency - np.conj(value))
         found.append((abs(value) / (2.0 * np.pi), _share(complex(part), total)))
-    return tuple(sorted((own for own in found if abs(own[1]) >= LEAST_MODE), key=lambda own: -abs(own[1])))
+    return tuple(sorted((share for share in found if abs(share[1]) >= LEAST_MODE), key=lambda share: -abs(share[1])))
 
 
 def _derivatives(

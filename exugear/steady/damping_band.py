@@ -128,7 +128,11 @@ def _highest_peaks(
     of_quantity: list[set[tuple[int, int]]] = []
     for quantity in quantities:
         size = quantity.sizes(amplitude[:, 1:]).max(axis=2)
-        peaks = [(int(point), line) for line, own in enumerate(size.T, start=1) for point in standing_peaks(own)]
+        peaks = [
+            (int(point), line)
+            for line, amplitudes in enumerate(size.T, start=1)
+            for point in standing_peaks(amplitudes)
+        ]
         of_quantity.append(set(peaks))
         peaks = sorted((peak for peak in peaks if inside[peak[0]]), key=lambda peak: -size[peak[0], peak[1] - 1])
         chosen |= {peak for peak in peaks[:MOST_PEAKS] if size[peak[0], peak[1] - 1] > 0.0}

@@ -229,7 +229,7 @@ class HarmonicBalanceModel:
     @cached_property
     def quantities(self) -> tuple[Quantity, ...]:
         """Quantities that describe the response, made of its signals."""
-        return quantities_of([own.name for own in self.signal_names], mount_names(self.waves.assembly))
+        return quantities_of([name.name for name in self.signal_names], mount_names(self.waves.assembly))
 
     @cached_property
     def weights(self) -> Floats:
@@ -247,9 +247,7 @@ class HarmonicBalanceModel:
     @property
     def bearing_names(self) -> tuple[str, ...]:
         """Bearings whose laws are evaluated in time, planets' by their family, in the order of the laws."""
-        if self.bearings is None:
-            return ()
-        return self.bearings.names
+        return () if self.bearings is None else self.bearings.names
 
     @cached_property
     def bearing_signals(self) -> Integers:
@@ -369,7 +367,7 @@ class HarmonicBalanceModel:
             travelling = mesh_waves(self.system, more)
             self._one_by_one[more] = HarmonicBalanceModel(travelling, usual.harmonics // 2, usual.combinations // 2)
         other = self._one_by_one[more]._copied()
-        slow = [own for _, own in other.waves.carriers]
+        slow = [planets for _, planets in other.waves.carriers]
         other._one_by_one, other._lattices, other._reach = self._one_by_one, self._lattices, self._reach
         loud = self.lines.part(strong).select_bases(bases)
         whole = self.larger.select_bases(bases)
@@ -582,14 +580,12 @@ class HarmonicBalanceModel:
 
 def _stacked(ports: list[MeshInterface]) -> dict[str, Floats]:
     """Arrays of ports at several speeds (speeds, ...), by their names."""
-    by_name = {own.name: [getattr(port, own.name) for port in ports] for own in fields(MeshInterface)}
+    by_name = {field.name: [getattr(port, field.name) for port in ports] for field in fields(MeshInterface)}
     return {name: np.array(values) for name, values in by_name.items() if values[0] is not None}
 
 
 def _lines_within(waves: MeshWaves, reach: HarmonicTruncation) -> LineSet:
     """Orders up to a limit, with the sidebands caused by planets that mesh out of phase."""
     lines = line_set(waves.base_orders.tolist(), reach.harmonics, reach.combinations)
-    modulators = [own for _, own in waves.carriers]
-    if waves.passing:
-        return beside(lines, modulators, 0)
-    return modulated(lines, modulators)
+    modulators = [planets for _, planets in waves.carriers]
+    return beside(lines, modulators, 0) if waves.passing else modulated(lines, modulators)

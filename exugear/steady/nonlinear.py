@@ -35,7 +35,7 @@ from exugear.steady.mean_system.sampled_laws import (
     widened,
 )
 from exugear.steady.response import Response, rates_of
-from exugear.system.statics import RIGID_BODY_LIMIT
+from exugear.system.modes import fastest_growth, state_matrix
 from fe_ste.tools.arrays import Complexes, Floats, Integers
 
 BALANCED = 1e-8
@@ -130,7 +130,7 @@ class HarmonicResidual:
             found = [model.cycle_coefficients, model.cycle_pulls]
             found += [*model.cycle_moments, model.cycle_moments_beyond] if model.shuttles else []
         rate = 2j * np.pi * np.arange(model.harmonics + 1)
-        return np.stack([own * rate**order for own in found for order in range(3)], axis=1)
+        return np.stack([curve * rate**order for curve in found for order in range(3)], axis=1)
 
     @cached_property
     def _lattice_stiffness(self) -> Floats:
@@ -166,8 +166,8 @@ class HarmonicResidual:
             else:
                 found.append(self._sample_row(n, readings[:, u], stiffness[..., u]))
         shape = self.interface.ports.forces.shape[1], readings.shape[2]
-        found = [widened(own, *shape) for own in found]
-        return LawSamples(*(np.stack(own, axis=1) for own in zip(*found, strict=True)))
+        found = [widened(samples, *shape) for samples in found]
+        return LawSamples(*(np.stack(samples, axis=1) for samples in zip(*found, strict=True)))
 
     def _sample_row(self, wave: int, readings: Floats, stiffness: Floats) -> LawSamples:
         """Sample the law of a mesh along a row with readings (s, r), stiffness (3 q, s)."""
@@ -483,8 +483,6 @@ def _mean_of_waves(there: Floats, back: Floats, slopes: Floats) -> Floats:
     return found
 
 
-# Stability of steady states: what varying meshes do to a disturbance
-
 SMOOTH_KICKS, PARTING_KICKS = 400, 1000
 """Minimum number of kicks per period, without and with contact loss, whose instants have to be resolved."""
 ROLLING = 2
@@ -520,9 +518,9 @@ def candidates(model: HarmonicBalanceModel, low: float, high: float) -> tuple[Ca
     slow = min(abs(low), abs(high))
     found = []
     for base, order in enumerate(model.waves.base_orders):
-        own = np.array([wave.base == base for wave in model.waves.waves])
+        of_base = np.array([wave.base == base for wave in model.waves.waves])
         for harmonic in range(1, model.harmonics + 1):
-            tangents = {at: own * values[:, harmonic] for at, values in model.cycle_tangents.items()}
+            tangents = {at: of_base * values[:, harmonic] for at, values in model.cycle_tangents.items()}
             turned = {at: values.conj() for at, values in tangents.items()}
             for sign in (1.0, -1.0):
                 there = _couple_modes(felt, tangents, seen.conj() if sign > 0.0 else seen)
@@ -566,7 +564,6 @@ def growth_at(balance: HarmonicResidual, readings: Complexes, base: int, least: 
     values = system.eigenvalues(speed)
     kicks = max(kicks_needed(float(np.abs(values).max()) / 2.0 / np.pi, period), least)
     varying = balance.tangents_along(readings, base, kicks)
-    lower = np.linalg.solve(system.mass, np.hstack([-system.stiffness_at(speed), -system.damping_at(speed)]))
     pushes = np.vstack(
         [np.zeros((size, varying.shape[1])), np.linalg.solve(system.mass, model.loads(ports))],
     )
@@ -576,11 +573,11 @@ def growth_at(balance: HarmonicResidual, readings: Complexes, base: int, least: 
     by_rates = np.zeros_like(rows) if ports.rates is None else ports.rates.reshape(-1, size)
     reads = np.block([[rows, by_rates], [carried, rows]])
     # Meshes of other bases do not vary: they belong to the constant part. Bearings do with all bases.
-    own = np.ones(len(model.weights), dtype=bool)
-    own[: len(model.waves.waves)] = [wave.base == base for wave in model.waves.waves]
-    pushed = np.repeat(own, ports.forces.shape[1])
-    read = np.tile(np.repeat(own, ports.readings.shape[1]), 2)
-    constant = np.vstack([np.eye(size, 2 * size, size), lower])
+    of_base = np.ones(len(model.weights), dtype=bool)
+    of_base[: len(model.waves.waves)] = [wave.base == base for wave in model.waves.waves]
+    pushed = np.repeat(of_base, ports.forces.shape[1])
+    read = np.tile(np.repeat(of_base, ports.readings.shape[1]), 2)
+    constant = state_matrix(system.mass, system.damping_at(speed), system.stiffness_at(speed))
     constant -= pushes[:, ~pushed] @ varying[0][np.ix_(~pushed, ~read)] @ reads[~read]
     # Many slopes are zero: what nothing pushes along or reads costs nothing then.
     pushed = pushed & varying.any(axis=(0, 2))
@@ -613,9 +610,4 @@ def growth_of_state(balance: HarmonicResidual, readings: Complexes, parted: bool
 
 def mean_growth(model: HarmonicBalanceModel) -> float:
     """Largest growth rate of the averaged system over its speeds, 1/s; free rotation excluded."""
-    rates = []
-    for speed in model.system.speeds:
-        values = model.system.eigenvalues(float(speed))
-        elastic = np.abs(values.imag) > 2.0 * np.pi * RIGID_BODY_LIMIT
-        rates.append(float(values.real[elastic].max(initial=-np.inf)))
-    return max(rates)
+    return max(fastest_growth(model.system.eigenvalues(float(speed))) for speed in model.system.speeds)

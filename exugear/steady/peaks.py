@@ -60,7 +60,7 @@ def line_name(index: tuple[int, ...], bases: tuple[str, ...]) -> str:
     'high_speed - sun_planet'
     """
     words = []
-    for multiple, base in sorted(zip(index, bases, strict=True), key=lambda item: -item[0]):
+    for multiple, base in sorted(zip(index, bases, strict=True), key=lambda pair: -pair[0]):
         if multiple:
             times = "" if abs(multiple) == 1 else f"{abs(multiple)} x "
             words.append(("- " if multiple < 0 else "+ ") + times + base.split(", ")[0])
@@ -135,26 +135,27 @@ def sidebands(data: xr.Dataset, peak: Peak, signal: str = "overall_dte", least: 
     peak : of it
     least : share of the peak below which an order is omitted
     """
-    point, own = _place(data, peak)
+    point, centre = _place(data, peak)
     index = data["index"].to_numpy()
     bases = tuple(str(name) for name in data["base"].to_numpy())
     names = [str(name) for name in data["signal"].to_numpy()]
     values: Floats = data["amplitude"].to_numpy()[point, :, names.index(signal)].astype(np.float64)
-    carrying = int(np.argmax(np.abs(index[own])))
+    carrying = int(np.argmax(np.abs(index[centre])))
     found = []
     for line in range(1, len(index)):
         # Lines are as good as their conjugates: the one whose multiple of the peak's base has the sign of the peak's.
-        multiples = index[line] * (-1 if index[line][carrying] * index[own][carrying] < 0 else 1)
-        apart = multiples - index[own]
-        if line == own or multiples[carrying] != index[own][carrying] or values[line] < least * values[own]:
+        multiples = index[line] * (-1 if index[line][carrying] * index[centre][carrying] < 0 else 1)
+        apart = multiples - index[centre]
+        if line == centre or multiples[carrying] != index[centre][carrying] or values[line] < least * values[centre]:
             continue
+        words = line_name(tuple(int(n) for n in apart), bases)
         found.append(
             Sideband(
                 line=line_name(tuple(int(n) for n in index[line]), bases),
                 frequency=float(data["order"][line]) * abs(peak.speed) / (2.0 * np.pi),
                 amplitude=float(values[line]),
-                share=float(values[line] / values[own]),
-                cause=_signed(line_name(tuple(int(n) for n in apart), bases)),
+                share=float(values[line] / values[centre]),
+                cause=words if words.startswith("- ") else f"+ {words}",
             )
         )
     return tuple(sorted(found, key=lambda band: -band.amplitude))
@@ -181,8 +182,8 @@ def planet_sidebands(
 
     def coefficient(name: str) -> complex:
         place = {"point": point, "line": line, "signal": names.index(name)}
-        own = data[["amplitude", "phase"]].isel(place)
-        return complex(float(own["amplitude"]) * np.exp(1j * float(own["phase"])))
+        selected = data[["amplitude", "phase"]].isel(place)
+        return complex(float(selected["amplitude"]) * np.exp(1j * float(selected["phase"])))
 
     found = []
     for family, (carrier, ratio) in carriers.items():
@@ -207,12 +208,6 @@ def _place(data: xr.Dataset, peak: Peak) -> tuple[int, int]:
     """Point and line of a peak."""
     orders: Floats = data["order"].to_numpy()
     return int(np.argmin(np.abs(data["speed"].to_numpy() - peak.speed))), int(np.argmin(np.abs(orders - peak.order)))
-
-
-def _signed(words: str) -> str:
-    if words.startswith("- "):
-        return words
-    return f"+ {words}"
 
 
 @dataclass(frozen=True)
@@ -245,8 +240,8 @@ def pulls(data: xr.Dataset) -> tuple[TensileMesh, ...]:
         if name.startswith("mesh_force "):
             places.setdefault(name.split(" ")[1], []).append(place)
     found = []
-    for mesh, own in places.items():
-        shares = _pulling(data, own)
+    for mesh, signals in places.items():
+        shares = _pulling(data, signals)
         most = int(np.argmax(shares))
         if shares[most] > 0.0:
             found.append(TensileMesh(mesh, int((shares > 0.0).sum()), float(data["speed"][most]), float(shares[most])))
@@ -255,8 +250,8 @@ def pulls(data: xr.Dataset) -> tuple[TensileMesh, ...]:
 
 def _pulling(data: xr.Dataset, places: list[int]) -> Floats:
     """Fraction of time at each speed with tensile mesh force, from its components: common one first, then others."""
-    own = data[["amplitude", "phase"]].isel(signal=places)
-    force = own["amplitude"].to_numpy() * np.exp(1j * own["phase"].to_numpy().astype(np.float64))
+    selected = data[["amplitude", "phase"]].isel(signal=places)
+    force = selected["amplitude"].to_numpy() * np.exp(1j * selected["phase"].to_numpy().astype(np.float64))
     static = force[:, 0, 0].real
     force *= np.where(static < 0.0, -1.0, 1.0)[:, None, None]
     swing = np.abs(force).sum(axis=(1, 2)) - np.abs(static)
@@ -309,8 +304,8 @@ def bearing_swings(data: xr.Dataset) -> tuple[BearingLoadExcursion, ...]:
 
 def _swinging(data: xr.Dataset, places: list[int], static: Floats) -> Floats:
     """Largest vibration along a static load (3,) at each speed, over that load."""
-    own = data[["amplitude", "phase"]].isel(signal=places, line=slice(1, None))
-    force = own["amplitude"].to_numpy() * np.exp(1j * own["phase"].to_numpy().astype(np.float64))
+    selected = data[["amplitude", "phase"]].isel(signal=places, line=slice(1, None))
+    force = selected["amplitude"].to_numpy() * np.exp(1j * selected["phase"].to_numpy().astype(np.float64))
     return np.asarray(np.nan_to_num(np.abs(force @ static).sum(axis=1)) / (static @ static))
 
 

@@ -174,9 +174,7 @@ class PointSolver:
     @property
     def continuation_model(self) -> HarmonicBalanceModel:
         """HarmonicBalanceModel with the orders of a continuation: twice the harmonics with contact loss."""
-        if self.model.is_nonlinear:
-            return self.model.finer
-        return self.model
+        return self.model.finer if self.model.is_nonlinear else self.model
 
     def readings(self, speed: float) -> Complexes:
         """Return the inputs of the mesh models (n, m, r) at an input speed (rad/s), in the orders of a continuation."""
@@ -330,9 +328,9 @@ def _state_near(model: HarmonicBalanceModel, interface: Interface, leg: Settling
         found = _refined(model, interface.speed, readings)
     except HarmonicBalanceError:
         return None
-    own = found.on(model)
+    state = found.on(model)
     # Phases hang on the last of the damping, to which the drive of the run adds.
-    difference = np.linalg.norm((np.abs(own.readings) - np.abs(readings))[1:, :, DEFLECTION])
+    difference = np.linalg.norm((np.abs(state.readings) - np.abs(readings))[1:, :, DEFLECTION])
     if difference < SAME_STATE_TOL * np.linalg.norm(readings[1:, :, DEFLECTION]):
         return found
     return None

@@ -140,7 +140,7 @@ def check_speeds(gearbox: Gearbox, speeds: SpeedRange) -> None:
     fastest = max(abs(speeds.first), abs(speeds.last))
     turns = gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
     rims = {name: abs(turns[name]) * radius for name, radius in rim_radii(gearbox).items()}
-    body, rim = max(rims.items(), key=lambda item: item[1], default=("", 0.0))
+    body, rim = max(rims.items(), key=lambda pair: pair[1], default=("", 0.0))
     if rim * fastest > BURSTING_RIM_SPEED:
         raise SteadyError(
             f"speeds {speeds.text}: the tip speed on {body} reaches {rim * fastest:.4g} m/s, and steel gears burst at "

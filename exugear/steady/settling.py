@@ -15,11 +15,9 @@ from exugear.steady.harmonics.lines import LineSet
 from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.steady.mean_system.rotating_frame import PlanetSet, RotatingFrame
 from exugear.system.kernels.coordinates import TILT
-from exugear.system.loads import DriveLaw, LoadTable
+from exugear.system.loads import Drive, LoadTable
 from exugear.transient.compiled.solver import CompiledSystem, unsupported_reason
 from fe_ste.tools.arrays import Complexes, Floats, Integers
-
-# Motions in time as the rotating frame sees them: its coordinates from those of the assembly, at many instants
 
 
 def frame_coordinates(frame: RotatingFrame, q: Floats, psi: Floats) -> Floats:
@@ -35,14 +33,14 @@ def frame_coordinates(frame: RotatingFrame, q: Floats, psi: Floats) -> Floats:
     u = q - np.outer(psi, assembly.rolling_velocity(still, frame.speeds))
     bend = assembly.rolling_acceleration(still, frame.speeds, dict.fromkeys(frame.speeds, 0.0))
     for planets in frame.sets:
-        own = np.array([assembly.coordinates[name] for name in planets.names])
-        if own[0, 0] >= 0:
-            _turn_back(u, q, planets, own, psi, bend)
+        coordinates = np.array([assembly.coordinates[name] for name in planets.names])
+        if coordinates[0, 0] >= 0:
+            _turn_back(u, q, planets, coordinates, psi, bend)
         shapes = planets.values(planets.ratio * psi)
         back = shapes / (shapes**2).sum(axis=1, keepdims=True)
-        for axis in range(own.shape[1]):
-            if own[0, axis] >= 0:
-                u[:, own[:, axis]] = np.einsum("spw,sp->sw", back, u[:, own[:, axis]])
+        for axis in range(coordinates.shape[1]):
+            if coordinates[0, axis] >= 0:
+                u[:, coordinates[:, axis]] = np.einsum("spw,sp->sw", back, u[:, coordinates[:, axis]])
     return u
 
 
@@ -65,8 +63,6 @@ def _rotated(plane: Floats, angle: Floats) -> Floats:
     s = np.sin(angle)
     return np.stack([c * plane[:, 0] - s * plane[:, 1], s * plane[:, 0] + c * plane[:, 1]], axis=1)
 
-
-# Runs in time at constant speed until the motion repeats, and the lines of what they settle to
 
 PERIODS = 80
 """Periods of the slowest base in one leg of a run; lines are fitted over its second half."""
@@ -162,7 +158,7 @@ class SettlingRun:
         stiffness = self._inertia * rate**2
         damping = 1.4 * self._inertia * rate
         law = (float(q[pinned]), self._speed, 0.0)
-        drive = DriveLaw(assembly.gearbox.case.overall.input, stiffness, damping, law)
+        drive = Drive(assembly.gearbox.case.overall.input, stiffness, damping, law)
         run = CompiledSystem(assembly, q, v, LoadTable(self._torques, drive=drive), self._step)
         states = np.empty((self._steps, assembly.size))
         speeds = np.empty_like(states)

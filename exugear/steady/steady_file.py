@@ -160,7 +160,7 @@ def _attributes(response: SteadyResponse) -> dict[str, Any]:
         "harmonics": response.harmonics,
         "change_with_more": response.change_with_more,
         "shared_lines": "; ".join(_shared(row, response.base_names) for row in response.lines.shared()),
-        "contributions": json.dumps([{"line": line, **asdict(own)} for line, own in response.contributions]),
+        "contributions": json.dumps([{"line": line, **asdict(parts)} for line, parts in response.contributions]),
         "folds": json.dumps(response.folds),
         "branch_ended": response.branch_ended,
         "not_converged": json.dumps([{"speed": speed, "reason": reason} for speed, reason in response.unsolved]),

@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from functools import partial
 
 import numpy as np
 
@@ -25,12 +26,12 @@ from exugear.steady.crossings import (
 )
 from exugear.steady.damping_band import DampingBand, damping_band, no_band
 from exugear.steady.excitation import HarmonicBalanceModel
-from exugear.steady.harmonics.branches import Branch, Scales, standing_peaks, trace
+from exugear.steady.harmonics.branches import Scales, standing_peaks, trace
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
 from exugear.steady.harmonics.lines import LineSet
 from exugear.steady.mean_system.mesh_places import DEFLECTION
 from exugear.steady.mean_system.rotating_frame import SteadyError
-from exugear.steady.mean_system.signals import Quantity, SignalName
+from exugear.steady.mean_system.signals import SignalName
 from exugear.steady.nonlinear import HarmonicResidual, Tangent, growth_of_state
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.response import Response, dissipated_and_given, signals
@@ -39,8 +40,6 @@ from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers, SingleComplexes, Texts
 from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 from fe_ste.tools.threads import one_dense_thread
-
-# Branches of steady states over speed, through their folds, with the stability of every point
 
 LONGEST = 0.4
 """Longest step along a branch: in tenths of the static deflections, and in hundredths of the speed."""
@@ -130,23 +129,17 @@ def follow_branch(
         growth_of_state(balance_at(float(speed)), reading, model.is_nonlinear)
         for speed, reading in zip(found.parameter, readings, strict=True)
     ]
-    ended = "" if found.whole else _ended(found, last)
+    ended = ""
+    if not found.whole:
+        turns = [n for n, _ in found.folds]
+        count = len(found.parameter)
+        ended = (
+            f"the continuation ends at {found.parameter[-1] / RPM:.5g} rpm after {count} points, before "
+            f"{last / RPM:.5g} rpm: steps are short at grazing contact, with {len(turns)} turning points, "
+            f"{sum(n > count // 2 for n in turns)} of them in the second half; start at that speed, or remove "
+            "--continuation"
+        )
     return SteadyBranch(found.parameter, readings, np.array(growth), tuple(fold for _, fold in found.folds), ended)
-
-
-def _ended(branch: Branch, last: float) -> str:
-    """Say where a branch ended that has as many points as are allowed, and what it did there."""
-    p = branch.parameter
-    turns = [n for n, _ in branch.folds]
-    lately = sum(n > len(p) // 2 for n in turns)
-    return (
-        f"the continuation ends at {p[-1] / RPM:.5g} rpm after {len(p)} points, before {last / RPM:.5g} rpm: steps "
-        f"are short at grazing contact, with {len(turns)} turning points, {lately} of them in the second half; start "
-        "at that speed, or remove --continuation"
-    )
-
-
-# Steady response of a gearbox over speed: every line at every speed, without a run-up
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,13 +169,12 @@ class SolvedPoints:
 
     def part(self, which: slice | Booleans | Integers) -> SolvedPoints:
         """Take some of the points."""
-        return SolvedPoints(**{own.name: getattr(self, own.name)[which] for own in fields(self)})
+        return SolvedPoints(**{field.name: getattr(self, field.name)[which] for field in fields(self)})
 
     def joined_with(self, other: SolvedPoints) -> SolvedPoints:
         """Put the points of another behind these."""
-        return SolvedPoints(
-            **{own.name: np.concatenate([getattr(self, own.name), getattr(other, own.name)]) for own in fields(self)}
-        )
+        names = [field.name for field in fields(self)]
+        return SolvedPoints(**{name: np.concatenate([getattr(self, name), getattr(other, name)]) for name in names})
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,7 +247,7 @@ class SteadyResponse(ReprMixin):
         SteadyError
             There is no such signal, or no such line.
         """
-        names = [own.name for own in self.signals]
+        names = [name.name for name in self.signals]
         if signal not in names:
             raise SteadyError(f"no signal {signal!r}; signals are {', '.join(names)}")
         place, mirrored = self.lines.find(np.array(line, dtype=np.int64))
@@ -305,19 +297,31 @@ def response_of(
     report = progress or (lambda done, total: None)
     tracks = _tracks(model, even)
     operation = operating_range(assembly.gearbox)
-    looked_for = settings.at_resonances and (model.loses_contact or model.waves.varies)
-    found = crossings(model, tracks, solver.forcing, operation) if looked_for else ()
+    at_resonances = settings.at_resonances and (model.loses_contact or model.waves.varies)
+    found = crossings(model, tracks, solver.forcing, operation) if at_resonances else ()
     folds: tuple[float, ...] = ()
     ended = ""
     if settings.branches:
-        solved, folds, ended = _follow_branch(solver, settings.speeds.first, settings.speeds.last, report)
+        points, folds, ended = _follow_branch(solver, settings.speeds.first, settings.speeds.last, report)
     else:
-        solved = _solve(solver, even, found, looked_for, _Work(known, report, keep, keep_every))
-    there = np.isfinite(solved.drive_torque)
-    if not there.any():
-        raise HarmonicBalanceError(str(solved.remark[0]))
+        points = _empty(solver.model, with_crossings(even, found))
+        solve = partial(_solve_from, known=known, progress=report, keep=keep, keep_every=keep_every)
+        solve(points, 0, lambda: solver)
+        if at_resonances:
+            points = _with_tops(solver, points, operation, solve)
+        points = points.part(np.argsort(points.speed, kind="stable"))
+    is_solved = np.isfinite(points.drive_torque)
+    if not is_solved.any():
+        raise HarmonicBalanceError(str(points.remark[0]))
+    solved = points.part(is_solved)
     linear = solver.linear
-    explained = () if linear.loses_contact else _contributions(linear, found)
+    explained = []
+    for crossing in () if linear.loses_contact else found[:PEAKS_WITH_CONTRIBUTIONS]:
+        speed = loudest_near(linear, crossing.speed, 2.0 * crossing.damping, crossing.line)
+        explained.append((crossing.line, contributions(linear, speed, crossing.line)))
+    band = no_band(tuple(quantity.name for quantity in linear.quantities))
+    if settings.method != "nonlinear" and not linear.loses_contact:
+        band = damping_band(linear, settings.method, solved.speed, solved.amplitude)
     growth = solver.growth(float(even.min()), float(even.max()))
     return SteadyResponse(
         assembly=model.waves.assembly,
@@ -328,10 +332,10 @@ def response_of(
         wave_names=tuple(wave.name for wave in model.waves.waves),
         signals=model.signal_names,
         bearing_names=solver.model.bearing_names,
-        solved=solved.part(there),
-        unsolved=tuple(zip(solved.speed[~there].tolist(), solved.remark[~there].tolist(), strict=True)),
+        solved=solved,
+        unsolved=tuple(zip(points.speed[~is_solved].tolist(), points.remark[~is_solved].tolist(), strict=True)),
         crossings=found,
-        contributions=explained,
+        contributions=tuple(explained),
         folds=folds,
         branch_ended=ended,
         growth_rate=float(np.fmax.reduce(solved.growth, initial=growth)),
@@ -339,18 +343,10 @@ def response_of(
         stiffness_variation=model.system.variation,
         harmonics=model.usual_harmonics,
         left_out=model.waves.left_out(model.usual_harmonics),
-        change_with_more=math.nan if settings.branches else _change_with_more(solver, solved.part(there)),
-        band=_band(solver, solved.part(there)),
+        change_with_more=math.nan if settings.branches else _change_with_more(solver, solved),
+        band=band,
         campbell=campbell_of(linear.system, tracks),
     )
-
-
-def _band(solver: PointSolver, solved: SolvedPoints) -> DampingBand:
-    """Find how high the highest peaks are over the range of damping, where the method is linear in the deflections."""
-    model = solver.linear
-    if solver.method == "nonlinear" or model.loses_contact:
-        return no_band(tuple(quantity.name for quantity in model.quantities))
-    return damping_band(model, solver.method, solved.speed, solved.amplitude)
 
 
 def _tracks(model: HarmonicBalanceModel, speeds: Floats) -> ModeTracks:
@@ -364,56 +360,67 @@ def _tracks(model: HarmonicBalanceModel, speeds: Floats) -> ModeTracks:
     return modes_over_speed(model.system, low, high, highest)
 
 
-@dataclass(frozen=True)
-class _Work:
-    """Context of the solution of points: known points, progress callback, and storage."""
-
-    known: SolvedPoints | None
-    progress: Callable[[int, int], None]
-    keep: Kept | None
-    keep_every: float
-
-
-def _solve(solver: PointSolver, even: Floats, found: tuple[Crossing, ...], tops: bool, work: _Work) -> SolvedPoints:
-    """Solve even speeds and those of crossings, then those of tops between them if wanted; in ascending order."""
-    speeds = with_crossings(even, found)
-    solved = _continued(_empty(solver.model, speeds), 0, lambda: solver, work)
-    if tops:
-        solved = _with_tops(solver, solved, work)
-    return solved.part(np.argsort(solved.speed, kind="stable"))
-
-
-def _with_tops(solver: PointSolver, solved: SolvedPoints, work: _Work) -> SolvedPoints:
+def _with_tops(
+    solver: PointSolver, points: SolvedPoints, operation: tuple[float, float] | None, solve: Callable[..., None]
+) -> SolvedPoints:
     """Solve at speeds where neighbours indicate peaks higher than at any known speed, until none remain.
 
     Each such state starts independently of others, so that a resumed computation gives the same results.
     """
-    quantities = solver.model.quantities
-    operation = operating_range(solver.model.waves.assembly.gearbox)
     tops: KnownTops = {}
     for _ in range(ROUNDS):
-        more = _missed(solved, quantities, operation, tops)
+        is_solved = np.flatnonzero(np.isfinite(points.drive_torque))
+        solved = points.part(is_solved[np.argsort(points.speed[is_solved], kind="stable")])
+        smooth = np.asarray(~(solved.apart.any(axis=1) | solved.free.any(axis=1)))
+        more = missed_tops(solved.speed, solved.amplitude, smooth, solver.model.quantities, operation, tops)
         if not more.size:
             break
-        count = len(solved.speed)
-        solved = solved.joined_with(_empty(solver.model, more))
-        solved = _continued(solved, count, lambda: PointSolver(solver.linear, solver.method), work)
-        # A speed that nobody asked for and that has no state is none to tell of.
-        solved_speeds = np.isfinite(solved.drive_torque)
-        solved_speeds[:count] = True
-        if not solved_speeds.all():
-            solved = solved.part(solved_speeds)
-    return solved
+        count = len(points.speed)
+        points = points.joined_with(_empty(solver.model, more))
+        solve(points, count, lambda: PointSolver(solver.linear, solver.method))
+        # A speed that was not requested and has no steady state is dropped without a warning.
+        points = points.part((np.arange(len(points.speed)) < count) | np.isfinite(points.drive_torque))
+    return points
 
 
-def _missed(
-    solved: SolvedPoints, quantities: tuple[Quantity, ...], operation: tuple[float, float] | None, tops: KnownTops
-) -> Floats:
-    """Speeds of maxima between solved points, which may be in any order."""
-    there = np.flatnonzero(np.isfinite(solved.drive_torque))
-    known = solved.part(there[np.argsort(solved.speed[there], kind="stable")])
-    smooth = np.asarray(~(known.apart.any(axis=1) | known.free.any(axis=1)))
-    return missed_tops(known.speed, known.amplitude, smooth, quantities, operation, tops)
+def _solve_from(
+    points: SolvedPoints,
+    first: int,
+    solver: Callable[[], PointSolver],
+    known: SolvedPoints | None,
+    progress: Callable[[int, int], None],
+    keep: Kept | None,
+    keep_every: float,
+) -> None:
+    """Solve all points from one on; known ones are taken over."""
+    count = first
+    if known is not None:
+        shared = min(len(known.speed), len(points.speed))
+        if np.array_equal(known.speed[:shared], points.speed[:shared]):
+            count = max(first, shared)
+        start = solver()
+        if not first and start.model.is_nonlinear and count < len(points.speed):
+            # States with contact loss depend on earlier ones: continue from the last one with full contact.
+            touching = np.isfinite(known.drive_torque) & ~(known.apart.any(axis=1) | known.free.any(axis=1))
+            count = int(np.max(np.flatnonzero(touching[:count]) + 1, initial=0))
+            if count:
+                start.response(float(points.speed[count - 1]))
+        for field in fields(SolvedPoints):
+            getattr(points, field.name)[first:count] = getattr(known, field.name)[first:count]
+    kept = time.monotonic()
+    done = count
+    try:
+        for n in range(count, len(points.speed)):
+            _solve_one(points, n, solver())
+            done = n + 1
+            progress(done, len(points.speed))
+            if keep is not None and time.monotonic() - kept > keep_every:
+                keep(points.part(slice(done)))
+                kept = time.monotonic()
+    except KeyboardInterrupt:
+        if keep is not None and done:
+            keep(points.part(slice(done)))
+        raise
 
 
 def _change_with_more(solver: PointSolver, solved: SolvedPoints) -> float:
@@ -425,53 +432,18 @@ def _change_with_more(solver: PointSolver, solved: SolvedPoints) -> float:
         return 0.0
     other = PointSolver(solver.linear.with_harmonics(math.ceil(MORE * model.usual_harmonics)), solver.method)
     values: Floats = np.abs(solved.amplitude[:, :, 0].astype(np.complex128))
-    found = [(point, line) for line in range(1, values.shape[1]) for point in _tops_of(values[:, line])]
+    found = []
+    for line in range(1, values.shape[1]):
+        peaks = standing_peaks(values[:, line])
+        found += [(int(point), line) for point in (peaks if peaks.size else [np.argmax(values[:, line])])]
     found.sort(key=lambda peak: -values[peak])
     changes = [0.0]
     for point, line in found[:CHECKED]:
         place, _ = other.model.lines.find(model.lines.index[line])
         response = other.response(float(solved.speed[point]))
-        own = 2.0 * abs(complex(signals(other.model, response)[int(place), 0]))
-        changes.append(abs(own / max(float(values[point, line]), 1e-300) - 1.0))
+        amplitude = 2.0 * abs(complex(signals(other.model, response)[int(place), 0]))
+        changes.append(abs(amplitude / max(float(values[point, line]), 1e-300) - 1.0))
     return max(changes)
-
-
-def _tops_of(values: Floats) -> Integers:
-    """Return indices of the peaks among values over speed; without a peak, the index of the maximum of the order."""
-    peaks = standing_peaks(values)
-    if peaks.size:
-        return peaks
-    return np.array([np.argmax(values)])
-
-
-def _continued(out: SolvedPoints, first: int, solver: Callable[[], PointSolver], work: _Work) -> SolvedPoints:
-    """Solve all points from one on, but for those that are known."""
-    count = first
-    known = work.known
-    if known is not None:
-        count = max(first, _same_beginning(known.speed, out.speed))
-        own = solver()
-        if not first and own.model.is_nonlinear and count < len(out.speed):
-            count = _count_in_contact(known, count)
-            if count:
-                own.response(float(out.speed[count - 1]))
-        for field in fields(SolvedPoints):
-            getattr(out, field.name)[first:count] = getattr(known, field.name)[first:count]
-    kept = time.monotonic()
-    done = count
-    try:
-        for n in range(count, len(out.speed)):
-            _solve_one(out, n, solver())
-            done = n + 1
-            work.progress(done, len(out.speed))
-            if work.keep is not None and time.monotonic() - kept > work.keep_every:
-                work.keep(out.part(slice(done)))
-                kept = time.monotonic()
-    except KeyboardInterrupt:
-        if work.keep is not None and done:
-            work.keep(out.part(slice(done)))
-        raise
-    return out
 
 
 def _solve_one(out: SolvedPoints, n: int, solver: PointSolver) -> None:
@@ -485,15 +457,6 @@ def _solve_one(out: SolvedPoints, n: int, solver: PointSolver) -> None:
         return
     if solver.state is not None:
         out.growth[n], out.remark[n] = solver.state.growth, solver.state.remark[:LONGEST_WARNING]
-
-
-def _contributions(model: HarmonicBalanceModel, found: tuple[Crossing, ...]) -> tuple[tuple[int, Contributions], ...]:
-    """Find the contributions to the orders at the strongest crossings, each at its maximum."""
-    explained = []
-    for crossing in found[:PEAKS_WITH_CONTRIBUTIONS]:
-        speed = loudest_near(model, crossing.speed, 2.0 * crossing.damping, crossing.line)
-        explained.append((crossing.line, contributions(model, speed, crossing.line)))
-    return tuple(explained)
 
 
 def _follow_branch(
@@ -542,20 +505,3 @@ def _fill(out: SolvedPoints, n: int, model: HarmonicBalanceModel, response: Resp
     out.apart[n] = response.apart
     out.free[n] = response.free
     out.energy_error[n] = (taken - given) / max(abs(taken), abs(given), 1e-300)
-
-
-def _count_in_contact(known: SolvedPoints, count: int) -> int:
-    """Count the known points up to the last with full contact: later states depend on earlier ones."""
-    parted = known.apart[:count].any(axis=1) | known.free[:count].any(axis=1)
-    touching = np.isfinite(known.drive_torque[:count]) & ~parted
-    if touching.any():
-        return int(np.flatnonzero(touching)[-1]) + 1
-    return 0
-
-
-def _same_beginning(known: Floats, speeds: Floats) -> int:
-    """Count the points that are known already."""
-    count = min(len(known), len(speeds))
-    if np.array_equal(known[:count], speeds[:count]):
-        return count
-    return 0

@@ -76,9 +76,7 @@ def dataset_of(study: Study, records: Mapping[str, Record]) -> xr.Dataset:
     }
     coordinates |= {name: (name, np.array(names, dtype=object)) for name, names in labels.items() if names}
     dataset = xr.Dataset(variables, coordinates, _attributes(study, at))
-    if SIDE in design.shape:
-        return with_slopes(dataset, study)
-    return dataset
+    return with_slopes(dataset, study) if SIDE in design.shape else dataset
 
 
 def _filled(shape: tuple[int, ...], done: list[tuple[tuple[int, ...], Record]], value: Any) -> Any:
@@ -89,8 +87,8 @@ def _filled(shape: tuple[int, ...], done: list[tuple[tuple[int, ...], Record]], 
 
 
 def _row(record: Record, name: str, labels: list[str]) -> list[float]:
-    own = record.values.get(name) or {}
-    return [number_of(own.get(label)) for label in labels]
+    value = record.values.get(name) or {}
+    return [number_of(value.get(label)) for label in labels]
 
 
 def _point_variables(
@@ -232,7 +230,7 @@ class Criteria:
         """Read the criteria from a study file with a section `optimise`."""
         wanted = study.optimise
         assert wanted is not None
-        limits = tuple(one for name, limit in wanted.limits.items() for one in _limits(name, limit))
+        limits = tuple(text for name, limit in wanted.limits.items() for text in _limits(name, limit))
         return cls(tuple(wanted.minimise), limits, wanted.percentile or USUAL_PERCENTILE)
 
     @property
@@ -243,9 +241,7 @@ class Criteria:
 
     def percent(self, side: Side) -> float:
         """Return the percentile for a side."""
-        if side == "high":
-            return self.percentile
-        return 100.0 - self.percentile
+        return self.percentile if side == "high" else 100.0 - self.percentile
 
     def reduce_draws(self, values: Floats, side: Side) -> Floats:
         """Reduce an output (..., draws) to one value; a failed draw counts as the worst."""
@@ -330,9 +326,7 @@ def searched_dataset(
 
 def judged_name(study: Study, name: str, side: Side) -> str:
     """Return the variable of the dataset used as criterion: the output, or its percentile over the tolerances."""
-    if study.tolerances is None:
-        return name
-    return f"{name}_{side}"
+    return name if study.tolerances is None else f"{name}_{side}"
 
 
 def _judged(dataset: xr.Dataset, study: Study, criteria: Criteria, name: str, side: Side) -> xr.DataArray:

@@ -121,9 +121,7 @@ def number_of(value: Any) -> float:
     [2.0, inf, -inf, nan]
     """
     if isinstance(value, str):
-        if value.startswith("-"):
-            return -math.inf
-        return math.inf
+        return -math.inf if value.startswith("-") else math.inf
     if value is None:
         return math.nan
     return float(value)
@@ -287,12 +285,12 @@ def _built(task: Task, work: PointInput) -> Gearbox:
         check_parts(gearbox)
         return gearbox
     except GearboxFileError as error:
-        own = [
+        lines = [
             f"parameters.{task.parameters.get(path, '?')}: {path} = {value!r}"[:LONGEST_VALUE]
             for path, value in work.changes.items()
         ]
-        more = [f"and {len(own) - SHOWN_VALUES} more"] if len(own) > SHOWN_VALUES else []
-        raise GearboxFileError(*("; ".join([*own[:SHOWN_VALUES], *more]) for _ in own[:1]), *error.errors) from None
+        more = [f"and {len(lines) - SHOWN_VALUES} more"] if len(lines) > SHOWN_VALUES else []
+        raise GearboxFileError(*("; ".join([*lines[:SHOWN_VALUES], *more]) for _ in lines[:1]), *error.errors) from None
 
 
 def _journal_form(values: Values) -> Any:
@@ -301,8 +299,6 @@ def _journal_form(values: Values) -> Any:
         return {name: json_number(float(value)) for name, value in values.items()}
     return json_number(float(values))
 
-
-# Executors: this process, worker processes, a Dask cluster, or any executor of that protocol
 
 CONNECT_SECONDS = 30.0
 """Time limit for the answer of a scheduler, s."""

@@ -119,9 +119,7 @@ def _finite(values: Floats) -> Floats:
 
 def _label(values: xr.DataArray) -> str:
     units = str(values.attrs.get("units", ""))
-    if units not in ("", "1"):
-        return f"{values.name} / {units}"
-    return str(values.name)
+    return f"{values.name} / {units}" if units not in ("", "1") else str(values.name)
 
 
 def _draw_curves(axes: Axes, values: xr.DataArray, along: str, rows: Floats, labels: list[str]) -> None:
@@ -154,8 +152,8 @@ def _combinations(values: xr.DataArray, dimensions: list[str]) -> list[str]:
     """Return the labels of all combinations along some dimensions."""
     labels = [""]
     for dimension in dimensions:
-        own = values[dimension].to_numpy() if dimension in values.coords else np.arange(values.sizes[dimension])
-        words = [f"{entry:.4g}" if isinstance(entry, float) else str(entry) for entry in own]
+        coordinate = values[dimension].to_numpy() if dimension in values.coords else np.arange(values.sizes[dimension])
+        words = [f"{entry:.4g}" if isinstance(entry, float) else str(entry) for entry in coordinate]
         labels = [f"{before}, {word}".removeprefix(", ") for before in labels for word in words]
     return labels
 

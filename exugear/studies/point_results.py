@@ -22,7 +22,7 @@ from exugear.life.gear_life import pair_stresses
 from exugear.life.life import UNTRUSTED_REACH, check_reach, checked_loads, compute_life, life_hash, rating_of
 from exugear.life.life_file import to_dataset
 from exugear.life.load_spectrum.counted import CountedLoads
-from exugear.life.static_balance import KeptAngles, stress_requests
+from exugear.life.static_balance import KeptAngles, stored_table, stress_requests
 from exugear.results.folder import run_directory
 from exugear.results.run_file import load_run
 from exugear.steady.settings import SteadySettings, usual_speeds
@@ -42,7 +42,7 @@ from exugear.transient.start import refuse_to_resume
 from fe_ste.root_stress import MeshCycleStress
 from fe_ste.tools.stores import Store
 from fe_ste.tools.threads import stop_if_asked
-from fe_ste.transmission_error.table import MeshTable, TableError, TableInput, prepared_compliance
+from fe_ste.transmission_error.table import MeshTable, prepared_compliance
 from fe_ste.transmission_error.transmission_error import static_transmission_error
 
 if TYPE_CHECKING:
@@ -124,9 +124,9 @@ class Shared:
         folder = self.folder / "stress" / request.wanted.hash[:32]
         if request.stored is None:
             path = folder / f"{request.name}.states.nc"
-            request = replace(request, path=path, stored=_stored(path, request.wanted))
+            request = replace(request, path=path, stored=stored_table(path, request.wanted))
         with _waiting(folder / "lock"):
-            table = request.stored or _stored(request.path, request.wanted) or request.compute(progress)
+            table = request.stored or stored_table(request.path, request.wanted) or request.compute(progress)
             doubts = list(table_warnings(request.name, table))
             if doubts:
                 raise SharedTableError("; ".join(doubts))
@@ -134,18 +134,11 @@ class Shared:
 
     def bodies(self, gearbox: Gearbox, inertias: str) -> dict[str, ElasticBody]:
         """Return the reduced flexible bodies; computed once, under a lock."""
-        own = {key: value for key, value in gearbox.content.items() if key not in UNRELATED}
-        key = hashlib.sha256(json.dumps(own, sort_keys=True).encode()).hexdigest()
+        related = {key: value for key, value in gearbox.content.items() if key not in UNRELATED}
+        key = hashlib.sha256(json.dumps(related, sort_keys=True).encode()).hexdigest()
         folder = self.folder / "bodies"
         with _waiting(folder / f"{key[:32]}.lock"):
             return reduced_bodies(gearbox, inertias, folder)
-
-
-def _stored(path: Path, wanted: TableInput) -> MeshTable | None:
-    try:
-        return MeshTable.open(path, wanted)
-    except TableError:
-        return None
 
 
 # Rating and life of one point, as in the command `life`, with shared tables and stresses
@@ -234,9 +227,6 @@ def _requests(gearbox: Gearbox, choice: Choice, folder: Path) -> list[TableReque
 def _has_axes(choice: Choice) -> bool:
     law = LAWS.get(choice.mesh_model)
     return law is not None and law.needs_axes
-
-
-# Results of one point, each computed once when an output requires it
 
 
 class PointError(RuntimeError):

@@ -98,9 +98,6 @@ def _fits(value: object, kind: str) -> bool:
     return isinstance(value, _TYPES[kind]) and (kind == "bool" or not isinstance(value, bool))
 
 
-# Outputs of eigenmodes
-
-
 def frequencies(results: PointResults, *, count: int = 12) -> dict[str, float]:
     """Eigenfrequencies, the lowest first, without free rotation."""
     modes = results.modes
@@ -182,13 +179,11 @@ def planet_values(results: PointResults, family: str, values: Floats) -> Floats:
         There is no such family.
     """
     families = [mesh.family for mesh in results.gearbox.meshes]
-    chosen = [n for n, own in enumerate(families) if own == family]
+    chosen = [n for n, members in enumerate(families) if members == family]
     if not chosen:
         raise PointError(f"no meshes {family!r}; meshes are {', '.join(dict.fromkeys(families))}")
     return np.asarray(values[..., chosen], dtype=np.float64)
 
-
-# Outputs of runs in time
 
 SETTLING = 0.25
 """Fraction of a run at its beginning that is skipped."""
@@ -240,7 +235,7 @@ def order_amplitudes(
 
 def run_harmonics(results: PointResults, *, mesh: str, count: int = 6, signal: str = OVERALL) -> dict[str, float]:
     """Amplitudes of a signal at the order of a mesh and its multiples, in a run of at least two input revolutions."""
-    meshes = {own.family: own.name for own in results.gearbox.meshes}
+    meshes = {mesh.family: mesh.name for mesh in results.gearbox.meshes}
     if mesh not in meshes:
         raise PointError(f"no meshes {mesh!r}; meshes are {', '.join(meshes)}")
     order = results.gearbox.train.mesh_frequencies(2.0 * math.pi)[meshes[mesh]]
@@ -269,9 +264,6 @@ def _order_amplitudes(results: PointResults, signal: str, orders: list[float], s
     weights = 1.0 - np.cos(2.0 * math.pi * angle[:whole] / angle[whole])
     weighed = weights * values[:whole] * (2.0 / weights.sum())
     return [float(abs(np.exp(-1j * order * angle[:whole]) @ weighed)) for order in orders]
-
-
-# Outputs of steady-state responses over speed
 
 
 def nearest_names(name: str, known: Sequence[str]) -> str:
@@ -314,9 +306,7 @@ def loudest_peak(results: PointResults, *, signal: str = OVERALL) -> float:
 def loudest_speed(results: PointResults, *, signal: str = OVERALL) -> float:
     """Input speed at which an order of a signal is highest."""
     found = peaks(results.steady, signal)
-    if found:
-        return float(abs(found[0].speed))
-    return float("nan")
+    return float(abs(found[0].speed)) if found else float("nan")
 
 
 def harmonics(
@@ -520,23 +510,20 @@ def _flank_values(results: PointResults, key: str) -> dict[str, float]:
 def _bearing_values(results: PointResults, key: str, by: str, worst: Worst) -> dict[str, float]:
     """Return values by bearing, for one kind of life or the worst of all known ones."""
     data = results.life
-    names = [_name_of(kind, key) for kind in (LIVES.values() if by == MINIMUM else [LIVES[by]])]
+    names = [
+        ("bearing_damage" if (kind, key) == ("basic", "damage") else f"bearing_{kind}_{key}")
+        for kind in (LIVES.values() if by == MINIMUM else [LIVES[by]])
+    ]
     columns = zip(*(data[name].to_numpy().tolist() for name in names), strict=True)
     known = [[value for value in column if not math.isnan(value)] for column in columns]
     found = [worst(values) if values else math.nan for values in known]
     return dict(zip(map(str, data["bearing"].to_numpy()), found, strict=True))
 
 
-def _name_of(kind: str, key: str) -> str:
-    if (kind, key) == ("basic", "damage"):
-        return "bearing_damage"
-    return f"bearing_{kind}_{key}"
-
-
 def _worst(values: Mapping[str, float], part: str, worst: Worst) -> float:
     """Return the worst known value of all parts or of one."""
-    own = {name: value for name, value in values.items() if part in ("", name, name.split(" ")[0])}
-    known = [value for value in own.values() if not math.isnan(value)]
+    selected = {name: value for name, value in values.items() if part in ("", name, name.split(" ")[0])}
+    known = [value for value in selected.values() if not math.isnan(value)]
     if not known:
         raise PointError(f"{part or 'no part'}: the life of this gearbox has no such result; `exugear life` states why")
     return worst(known)
@@ -544,9 +531,7 @@ def _worst(values: Mapping[str, float], part: str, worst: Worst) -> float:
 
 def _number_of(holder: str) -> float:
     number = holder.rpartition("_")[2]
-    if number.isdecimal():
-        return float(number)
-    return math.nan
+    return float(number) if number.isdecimal() else math.nan
 
 
 # Table of all outputs for study files; a study in Python may add its own

@@ -244,7 +244,7 @@ class _Evaluated:
 
     def _report_record(self, record: Record) -> None:
         if self.tell is not None:
-            failed = sum(bool(own.error) for own in self.records.values()) + bool(record.error)
+            failed = sum(bool(record.error) for record in self.records.values()) + bool(record.error)
             self.tell(len(self.records), failed, self.expected)
 
     @property

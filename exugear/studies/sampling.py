@@ -265,8 +265,6 @@ def _named(content: Any, pattern: list[str], before: str = "") -> Iterator[str]:
         yield from _named(inner, rest, f"{before}.{name}" if before else name)
 
 
-# Points of a study: all combinations of listed values with all draws, as values by path in the gearbox file
-
 MOST_POINTS = 10_000_000
 SAMPLE = "sample"
 """Dimension of draws."""
@@ -433,9 +431,7 @@ def units_of(parameter: ParameterSection) -> str:
     if parameter.acts == "scales":
         return "1"
     units = {unit_of(path.rpartition(".")[2]) for path in parameter.targets}
-    if len(units) == 1:
-        return units.pop()
-    return ""
+    return units.pop() if len(units) == 1 else ""
 
 
 def _draws(study: StudyFile, drawn: Mapping[str, ParameterSection], gearbox: Gearbox) -> _Levels:
@@ -464,9 +460,9 @@ def drawn_values(
     draws: list[dict[str, float]] = [{} for _ in range(count)]
     first = 0
     for name, parameter in drawn.items():
-        own = cube[:, first : first + members[name]]
+        columns = cube[:, first : first + members[name]]
         first += members[name]
-        values = distribution_of(parameter, gearbox).at(correlated(own, parameter.correlation))
+        values = distribution_of(parameter, gearbox).at(correlated(columns, parameter.correlation))
         axes |= _drawn_axes(name, parameter, values)
         for n, row in enumerate(values):
             for m, path in enumerate(parameter.targets):

@@ -64,8 +64,6 @@ from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.versions import TABLE
 
-# Checks of a study before any point is computed: reserved names, equal points, options out of range
-
 OF_POINTS = ("error", "doubts", "seconds", "memory")
 """Variables of a dataset for each point in addition to its outputs."""
 OF_SEARCHES = ("evaluation", "on_front", "meets_limits")
@@ -96,7 +94,12 @@ def errors_of_names(study: StudyFile, kept: Mapping[str, Output]) -> Iterator[st
     stepped = any(parameter.kind == "step" for parameter in study.parameters.values())
     if study.optimise is not None:
         taken |= dict.fromkeys(OF_SEARCHES, "the points of an optimisation")
-        taken |= _taken_by_tolerances(study)
+        if study.tolerances:
+            taken[SAMPLE] = "the draws"
+            listed = [name for name, tolerance in study.tolerances.items() if tolerance.paths]
+            taken |= {f"{name}_path": f"the paths of tolerances.{name}" for name in listed}
+            sides = [(name, side) for name in study.outputs for side in ("high", "low")]
+            taken |= {f"{name}_{side}": f"a percentile of outputs.{name}" for name, side in sides}
     elif drawn:
         taken[SAMPLE] = "the draws"
         taken |= {f"{name}_path": f"the paths of parameters.{name}" for name in drawn if study.parameters[name].paths}
@@ -115,19 +118,6 @@ def errors_of_names(study: StudyFile, kept: Mapping[str, Output]) -> Iterator[st
         for name in getattr(study, first):
             if name in getattr(study, second):
                 yield f"{second}.{name}: {first}.{name} has the same name; rename one"
-
-
-def _taken_by_tolerances(study: StudyFile) -> dict[str, str]:
-    """Return the names reserved in the dataset of an optimisation with tolerances."""
-    if not study.tolerances:
-        return {}
-    taken = {
-        f"{name}_path": f"the paths of tolerances.{name}"
-        for name, tolerance in study.tolerances.items()
-        if tolerance.paths
-    }
-    sides = {f"{name}_{side}": f"a percentile of outputs.{name}" for name in study.outputs for side in ("high", "low")}
-    return {SAMPLE: "the draws", **taken, **sides}
 
 
 def errors_of_search(study: StudyFile, kept: Mapping[str, Output]) -> Iterator[str]:
@@ -151,7 +141,7 @@ def errors_of_paths(study: StudyFile) -> Iterator[str]:
     """
     owners: list[tuple[str, str, str]] = []
     for table, name, parameter in (
-        *(("parameters", name, own) for name, own in study.parameters.items()),
+        *(("parameters", name, parameter) for name, parameter in study.parameters.items()),
         *(("tolerances", name, tolerance) for name, tolerance in study.tolerances.items()),
     ):
         paths = (parameter.path,) if parameter.path else tuple(parameter.paths or parameter.targets)
@@ -185,11 +175,11 @@ def errors_of_values(design: Design) -> Iterator[str]:
 
 
 def errors_of_options(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choice) -> Iterator[str]:
-    """Report invalid options of the built-in outputs: out of range, or missing in this gearbox."""
-    own = {id(quantity) for quantity in QUANTITIES.values()}
+    """Report invalid options of the built-in outputs: out of range, contradictory, or missing in this gearbox."""
+    built_in = {id(quantity) for quantity in QUANTITIES.values()}
     known = _names(gearbox, choice)
     for name, output in kept.items():
-        if id(output.quantity) not in own:
+        if id(output.quantity) not in built_in:
             continue
         for key, value in output.options.items():
             entries = value if isinstance(value, list) else [value]
@@ -199,19 +189,15 @@ def errors_of_options(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choi
                 yield f"outputs.{name}.{key} = {value!r}: must be finite, and lie between {low:g} and {high:g}"
             elif key in known and value and value not in known[key]:
                 yield f"outputs.{name}.{key} = {str(value)[:200]!r}: no such {key}; there are {_listed(known[key])}"
-        yield from _errors_of_orders(name, output.options, gearbox)
-
-
-def _errors_of_orders(name: str, options: Mapping[str, Any], gearbox: Gearbox) -> Iterator[str]:
-    """Report options that contradict each other, or the positions of the table."""
-    if options.get("from_Hz", 0.0) > options.get("to_Hz", math.inf):
-        yield f"outputs.{name}.from_Hz = {options['from_Hz']:g}: must be below to_Hz = {options['to_Hz']:g}"
-    most = gearbox.ste.positions // 2
-    if options.get("harmonic", 1) > most:
-        yield (
-            f"outputs.{name}.harmonic = {options['harmonic']}: a table of {gearbox.ste.positions} positions has {most}"
-            " harmonics; set a lower harmonic, or more ste.positions"
-        )
+        options = output.options
+        if options.get("from_Hz", 0.0) > options.get("to_Hz", math.inf):
+            yield f"outputs.{name}.from_Hz = {options['from_Hz']:g}: must be below to_Hz = {options['to_Hz']:g}"
+        most = gearbox.ste.positions // 2
+        if options.get("harmonic", 1) > most:
+            yield (
+                f"outputs.{name}.harmonic = {options['harmonic']}: a table of {gearbox.ste.positions} positions has "
+                f"{most} harmonics; set a lower harmonic, or more ste.positions"
+            )
 
 
 def errors_of_needs(study: StudyFile, kept: Mapping[str, Output], gearbox: Gearbox) -> Iterator[str]:
@@ -231,9 +217,9 @@ def errors_of_signals(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choi
     """Report signals and orders that neither runs nor steady-state responses of this gearbox have."""
     tabled = choice.mesh_model == "table"
     jointed = choice.variant.spins_only
-    of_runs = [one for one in signals_of(tabled, jointed) if one.stored and one.dimensions[0] == "time"]
+    of_runs = [signal for signal in signals_of(tabled, jointed) if signal.stored and signal.dimensions[0] == "time"]
     families = [mesh.family for mesh in gearbox.meshes]
-    named = [one.options.get("signal", OVERALL) for one in kept.values() if one.quantity.needs == "steady"]
+    named = [output.options.get("signal", OVERALL) for output in kept.values() if output.quantity.needs == "steady"]
     steady = _steady_signals(gearbox, choice) if any(signal != OVERALL for signal in named) else []
     for name, output in kept.items():
         signal = str(output.options.get("signal", OVERALL))
@@ -244,8 +230,8 @@ def errors_of_signals(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choi
                 yield f"outputs.{name}.signal = {signal[:200]!r}: no such signal; there are {_listed(known)}"
         elif output.quantity.needs == "steady":
             if signal != OVERALL and named_amplitudes(steady, np.zeros(len(steady), complex), signal) is None:
-                places = dict.fromkeys(" ".join(own.split(" ")[:2]) for own in steady)
-                known = [*places, *(own for own in steady if own not in places)]
+                places = dict.fromkeys(" ".join(name.split(" ")[:2]) for name in steady)
+                known = [*places, *(name for name in steady if name not in places)]
                 yield f"outputs.{name}.signal = {signal[:200]!r}: no such signal; {nearest_names(signal, known)}"
             yield from _errors_of_line(name, output, families)
 
@@ -254,9 +240,9 @@ def _steady_signals(gearbox: Gearbox, choice: Choice) -> list[str]:
     """Return the names of all signals of a steady-state response, which do not depend on flexibility and mesh model."""
     variant = Variant.bushing if choice.variant.is_elastic else choice.variant
     law = "iso6336"
-    own = Choice(variant, law, choice.inertias)
+    plain = Choice(variant, law, choice.inertias)
     with suppress(BalanceError):
-        system = mean_system(assemble(gearbox, own, mesh_stiffness(gearbox, law)), np.ones(1))
+        system = mean_system(assemble(gearbox, plain, mesh_stiffness(gearbox, law)), np.ones(1))
         rows = signal_rows(system, 1.0).names
         return [signal.name for signal in (*rows, *mesh_signal_names(mesh_waves(system)))]
     return []
@@ -304,9 +290,6 @@ def _listed(names: Sequence[str]) -> str:
     """Return a list of at most twelve names as text."""
     shown = list(itertools.islice(names, 12))
     return (", ".join(shown) or "none") + (f" and {len(names) - len(shown)} more" if len(names) > len(shown) else "")
-
-
-# Study (gearbox, varied points and outputs), read from a file and checked
 
 
 @dataclass(frozen=True)
@@ -487,8 +470,8 @@ def _settings(file: StudyFile) -> PointSettings:
     """Return the settings for the results of points."""
     steady = None
     if file.steady is not None:
-        own = file.steady
-        check_law(file.choice.mesh_model, own.method)
-        speeds = SpeedRange.from_text(own.speeds)
-        steady = SteadySettings(speeds, own.method, own.harmonics, own.combinations, own.at_resonances)
+        section = file.steady
+        check_law(file.choice.mesh_model, section.method)
+        speeds = SpeedRange.from_text(section.speeds)
+        steady = SteadySettings(speeds, section.method, section.harmonics, section.combinations, section.at_resonances)
     return PointSettings(steady, file.run.duration_s, file.run.solver)

@@ -87,7 +87,9 @@ def assemble(
     rigid = [body for body in moving if body.name not in flexible]
     six = [body for body in rigid if not (variant.spins_only or body.spin_only)]
     alone = [body for body in rigid if body not in six]
-    coordinates = _coordinates(six, alone)
+    # Indices of the six coordinates of each body; -1 for all but the spin of a body that only turns.
+    coordinates = {body.name: tuple(range(6 * n, 6 * n + 6)) for n, body in enumerate(six)}
+    coordinates |= {body.name: (-1, -1, -1, -1, -1, 6 * len(six) + n) for n, body in enumerate(alone)}
     nodes = {body.name: node_position(body) for body in moving}
     size = 6 * len(six) + len(alone)
     for name, shaft in flexible.items():
@@ -204,12 +206,12 @@ def elastic_arrays(flexible: Mapping[str, ElasticBody], size: int, damping_time:
         if body.frame == "carrier":
             begin += body.size
             continue
-        own = [block[np.argsort(-body.spin[block], kind="stable")] for block in body.blocks]
+        sorted_blocks = [block[np.argsort(-body.spin[block], kind="stable")] for block in body.blocks]
         carried = body.mass @ body.spin
-        spinning = next((n for n, block in enumerate(own) if body.spin[block].any()), 0)
+        spinning = next((n for n, block in enumerate(sorted_blocks) if body.spin[block].any()), 0)
         inertia = float(body.spin @ carried) or 1.0
-        for block in own:
-            others = [n for n, other in enumerate(own) if body.gyroscopic[np.ix_(block, other)].any()]
+        for block in sorted_blocks:
+            others = [n for n, other in enumerate(sorted_blocks) if body.gyroscopic[np.ix_(block, other)].any()]
             if len(others) > 1:
                 raise VariantError(f"body {body.name}: gyroscopic forces couple one block to {len(others)} others")
             turning.append(len(blocks) + spinning)
@@ -217,10 +219,12 @@ def elastic_arrays(flexible: Mapping[str, ElasticBody], size: int, damping_time:
             parts["stiffness"].append(body.stiffness[np.ix_(block, block)])
             parts["mass"].append(body.mass[np.ix_(block, block)])
             parts["inverse"].append(np.asarray(np.linalg.inv(body.mass[np.ix_(block, block)]), dtype=np.float64))
-            parts["gyroscopic"].append(body.gyroscopic[np.ix_(block, own[others[0]])] if others else np.zeros((0, 0)))
+            parts["gyroscopic"].append(
+                body.gyroscopic[np.ix_(block, sorted_blocks[others[0]])] if others else np.zeros((0, 0))
+            )
             spin.append(body.spin[block])
             momentum.append(carried[block] / inertia)
-        blocks += [block + begin for block in own]
+        blocks += [block + begin for block in sorted_blocks]
         begin += body.size
     if not blocks:
         return no_elastic()
@@ -240,14 +244,6 @@ def elastic_arrays(flexible: Mapping[str, ElasticBody], size: int, damping_time:
         gyroscopic=flat["gyroscopic"],
         damping_time=np.full(len(blocks), damping_time),
     )
-
-
-def _coordinates(six: list[Body], alone: list[Body]) -> dict[str, tuple[int, ...]]:
-    """Six state indices of each moving body; -1 for all but the spin where a body has nothing else."""
-    found = {body.name: tuple(range(6 * n, 6 * n + 6)) for n, body in enumerate(six)}
-    for n, body in enumerate(alone):
-        found[body.name] = (-1, -1, -1, -1, -1, 6 * len(six) + n)
-    return found
 
 
 def _inertia(variant: Variant, six: list[Body], alone: list[Body]) -> InertiaArrays:

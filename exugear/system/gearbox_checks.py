@@ -27,8 +27,6 @@ from exugear.system.part_warnings import pair_warnings, part_warnings
 from exugear.system.tooth_mesh.placement import MeshError, line_of_action_row, loaded_flanks, tooth_places
 from fe_ste.tools.arrays import Floats
 
-# What bearings and meshes leave free: a body without stiffness in some direction has no static state
-
 TILT_LENGTH = 0.1
 """Length (m) that turns a tilt into a displacement, so that both are compared."""
 HOLDING_SHARE = 1e-10
@@ -140,8 +138,6 @@ def _rolling_motions(gearbox: Gearbox, moving: list[Body], starts: Mapping[str, 
     return np.asarray(np.linalg.qr(motions.T)[0].T)
 
 
-# Quick construction of all parts of a gearbox: errors of later steps are reported before these start
-
 MOST_STATES = 200_000
 """Most states of one table: at 50 ms each, three hours."""
 _FOLLOWING = range(5)
@@ -159,9 +155,12 @@ def check_parts(gearbox: Gearbox) -> None:
     families = {bearing.family: bearing for bearing in gearbox.bearings}
     attempts: list[Callable[[], object]] = [partial(_build_bearing, gearbox, bearing) for bearing in families.values()]
     attempts += [partial(_place_teeth, gearbox), partial(_count_states, gearbox)]
-    attempts += [partial(gearbox.table_distances, name) for name in _pairs_with_axes(gearbox)]
+    if gearbox.ste.centre_distance_offsets_um is not None:
+        at_work = {mesh.pair.name for mesh in gearbox.meshes}
+        tabled = [name for name, section in gearbox.case.pairs.items() if section.table or name in at_work]
+        attempts += [partial(gearbox.table_distances, name) for name in tabled]
     attempts += [partial(torque_series, gearbox, case) for case in gearbox.load_cases.values()]
-    attempts += [partial(_build_elastic_body, gearbox, name) for name in elastic_names(gearbox)]
+    attempts += [partial(check_elastic_body, gearbox, name) for name in elastic_names(gearbox)]
     elastic = {gearbox.body(name).family for name in elastic_names(gearbox)}
     attempts += [partial(check_shape, gearbox, name) for name in gearbox.case.bodies if name not in elastic]
     errors: list[str] = []
@@ -208,16 +207,14 @@ def usual_variant(gearbox: Gearbox) -> Variant:
     >>> usual_variant(Gearbox.from_toml("cases/grc750/gearbox.toml"))
     'bushing'
     """
-    if lacking(gearbox, Variant.bushing):
-        return Variant.rigid
-    return Variant.bushing
+    return Variant.rigid if lacking(gearbox, Variant.bushing) else Variant.bushing
 
 
 def _misfits(gearbox: Gearbox, variant: Variant) -> str:
     """Return the first error of `check_parts` about flexible bodies: an impossible body, or a seat off the body."""
     for name in elastic_names(gearbox) if variant.is_elastic else ():
         try:
-            _build_elastic_body(gearbox, name)
+            check_elastic_body(gearbox, name)
         except GearboxFileError as error:
             return error.errors[0].removeprefix(f"{gearbox.source}: ")
     return ""
@@ -248,14 +245,10 @@ def gearbox_warnings(gearbox: Gearbox) -> tuple[str, ...]:
         )
     lines += pair_warnings(gearbox)
     lines += part_warnings(gearbox)
-    lines += _narrowed_seats(gearbox)
-    return tuple(dict.fromkeys(lines))
-
-
-def _narrowed_seats(gearbox: Gearbox) -> Iterator[str]:
     for name in elastic_names(gearbox):
         if gearbox.case.bodies[gearbox.body(name).family].solid is None:
-            yield from narrowed_seats(gearbox, name)
+            lines += narrowed_seats(gearbox, name)
+    return tuple(dict.fromkeys(lines))
 
 
 def _build_bearing(gearbox: Gearbox, bearing: Bearing) -> None:
@@ -282,15 +275,3 @@ def _count_states(gearbox: Gearbox) -> None:
     states *= len(axes.misalignment_um or _FOLLOWING)
     if states > MOST_STATES:
         raise gearbox.error(f"ste: the axes result in {states} table states; at most {MOST_STATES} are permitted")
-
-
-def _pairs_with_axes(gearbox: Gearbox) -> list[str]:
-    """Pairs whose tables go over centre distances; none where nobody asked for these."""
-    if gearbox.ste.centre_distance_offsets_um is None:
-        return []
-    at_work = {mesh.pair.name for mesh in gearbox.meshes}
-    return [name for name, section in gearbox.case.pairs.items() if section.table or name in at_work]
-
-
-def _build_elastic_body(gearbox: Gearbox, name: str) -> None:
-    check_elastic_body(gearbox, name)

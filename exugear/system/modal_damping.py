@@ -64,7 +64,12 @@ def with_modal_damping(assembly: Assembly, percent: float | None = None) -> Asse
     wanted = 2.0 * damping_ratios(section, frequency) * 2.0 * np.pi * frequency
     columns = linear.mass @ shapes * np.sqrt(np.maximum(wanted - stated, 0.0))
     # Under preload the mode without stiffness differs from rolling by 1e-5; rolling itself is to have no damping.
-    rolling = _rolling(assembly)
+    # Velocities (size, n) of the gear train as it rolls, one column for each of its degrees of freedom.
+    gearbox = assembly.gearbox
+    train = gearbox.train
+    still = np.zeros(assembly.size)
+    speeds = [dict(zip(train.spins, column.tolist(), strict=True)) for column in train.kinematic_modes.T]
+    rolling = np.array([assembly.rolling_velocity(still, speed) for speed in speeds]).T
     carried = linear.mass @ rolling
     columns -= carried @ np.linalg.solve(rolling.T @ carried, rolling.T @ columns)
     return replace(assembly, modal=_arrays(assembly, columns))
@@ -83,15 +88,6 @@ def with_damping_times(gearbox: Gearbox) -> Gearbox:
         return gearbox
     kept = {key: value for key, value in gearbox.content["damping"].items() if not key.startswith("modal_")}
     return gearbox.varied({"damping": kept})
-
-
-def _rolling(assembly: Assembly) -> Floats:
-    """Velocities (size, n) of the gear train as it rolls, one column for each of its degrees of freedom."""
-    gearbox = assembly.gearbox
-    train = gearbox.train
-    still = np.zeros(assembly.size)
-    speeds = [dict(zip(train.spins, column.tolist(), strict=True)) for column in train.kinematic_modes.T]
-    return np.array([assembly.rolling_velocity(still, own) for own in speeds]).T
 
 
 def damping_in_words(section: DampingSection) -> str:
@@ -149,7 +145,7 @@ def damping_ratios(section: DampingSection, frequency: Floats) -> Floats:
         if not (place <= TAKEN * near).any():
             raise VariantError(
                 f"damping.modal_modes: no mode within {100 * TAKEN:g} % of {near:g} Hz; modes are at "
-                f"{', '.join(f'{own:.4g}' for own in frequency[np.argsort(place)][:NAMED])} Hz, ..."
+                f"{', '.join(f'{value:.4g}' for value in frequency[np.argsort(place)][:NAMED])} Hz, ..."
             )
         ratios[np.argmin(place)] = 0.01 * percent_of_mode
     return np.asarray(ratios)

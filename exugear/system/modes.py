@@ -29,7 +29,7 @@ from exugear.system.statics import RIGID_BODY_LIMIT, Linearised, linearise, mesh
 from exugear.system.system import Assembly, input_hash
 from exugear.system.tooth_mesh.element import Angles, MeshData
 from exugear.system.tooth_mesh.laws.registry import LAWS
-from fe_ste.tools.arrays import Booleans, Floats
+from fe_ste.tools.arrays import Booleans, Complexes, Floats
 from fe_ste.tools.display import ReprMixin, TitledRows
 from fe_ste.tools.drawing import axes_or_new
 from fe_ste.tools.stores import Layout, Store, load_dataset, write_dataset
@@ -37,8 +37,6 @@ from fe_ste.tools.stores import Layout, Store, load_dataset, write_dataset
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
-
-# Where the energy of modes sits: kinetic by body and motion, strain by element, and what moves in words
 
 BODY_MOTIONS = ("spin", "radial", "axial", "tilt", "bending", "twist", "stretch", "deformation")
 """What a body does: four motions as a rigid body, three deformations of an elastic shaft, the last of other bodies."""
@@ -124,7 +122,7 @@ def mode_name(assembly: Assembly, element_names: tuple[str, ...], kinetic: Float
         strained[family] = strained.get(family, 0.0) + float(share)
     words = []
     described = 0.0
-    for what, share in sorted(moving.items(), key=lambda item: -item[1]):
+    for what, share in sorted(moving.items(), key=lambda pair: -pair[1]):
         if described >= 0.8 or share < 0.05:
             break
         words.append(f"{what} {100 * share:.0f} %")
@@ -155,8 +153,6 @@ def participation(overall: Floats) -> Floats:
     squares = overall**2
     return np.asarray(squares / max(float(squares.sum()), 1e-300))
 
-
-# Eigenmodes of a gearbox variant: frequencies, damping, where the energy sits, and what moves in words
 
 RIGID_COORDINATES = ("x", "y", "z", "tilt_x", "tilt_y", "spin")
 FREE_ROTATION = "rigid-body rotation"
@@ -620,8 +616,18 @@ def undamped_modes(mass: Floats, stiffness: Floats, motions: Floats | None = Non
 
 def growth_rate(linear: Linearised) -> float:
     """Largest real part of the eigenvalues of M x'' + D x' + K x = 0, 1/s, the free rotation left out."""
-    size = len(linear.mass)
-    lower = np.linalg.solve(linear.mass, np.hstack([-linear.total_stiffness, -linear.total_damping]))
-    values = scipy.linalg.eigvals(np.vstack([np.eye(size, 2 * size, size), lower]))
-    elastic = np.abs(values.imag) > 2.0 * np.pi * RIGID_BODY_LIMIT
-    return float(values.real[elastic].max(initial=-np.inf))
+    matrix = state_matrix(linear.mass, linear.total_damping, linear.total_stiffness)
+    return fastest_growth(np.asarray(scipy.linalg.eigvals(matrix), dtype=np.complex128))
+
+
+def state_matrix(mass: Floats, damping: Floats, stiffness: Floats) -> Floats:
+    """Matrix A (2 size, 2 size) of M x'' + D x' + K x = 0 as y' = A y with y = (x, x')."""
+    size = len(mass)
+    lower = np.linalg.solve(mass, np.hstack([-stiffness, -damping]))
+    return np.vstack([np.eye(size, 2 * size, size), lower])
+
+
+def fastest_growth(eigenvalues: Complexes) -> float:
+    """Largest real part of eigenvalues (1/s) without the free rotation; minus infinity if there are no others."""
+    elastic = np.abs(eigenvalues.imag) > 2.0 * np.pi * RIGID_BODY_LIMIT
+    return float(eigenvalues.real[elastic].max(initial=-np.inf))

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from exugear.gearbox.parts import Bearing, Body
-from exugear.gearbox.units import KN
+from exugear.gearbox.units import optional_si, si
 from exugear.system.bearings.duty import BearingLoadState, OperatingPoint, duty_of, operating_point
 from exugear.system.bearings.rolling.catalogue import catalogue_rows
 from exugear.system.bearings.rolling.contact import bearing_load, equilibrium, row_contacts
@@ -241,7 +241,9 @@ def _states(
     """State at the angles zero, from a state that is near it; those over the turn of carriers with unequal planets."""
     here = _state(assembly, laws, _balance(assembly, laws, near=near))
     over_turns: dict[str, list[_SupportState]] = {}
-    for carrier in sorted({planets[0].carrier or "" for planets in _unequal(assembly)}):
+    equal = _equal(assembly)
+    unequal = [planets for planets in planet_families(assembly.bodies) if planets not in equal]
+    for carrier in sorted({planets[0].carrier or "" for planets in unequal}):
         over_turns[carrier] = [here]
         for turn in 2.0 * math.pi / CARRIER_ANGLES * np.arange(1, CARRIER_ANGLES):
             about = rolled_coordinates(assembly, carrier, float(turn))
@@ -278,11 +280,6 @@ def _equal(assembly: Assembly) -> list[list[Body]]:
     return [planets for planets in planet_families(assembly.bodies) if equally_spaced(planets)]
 
 
-def _unequal(assembly: Assembly) -> list[list[Body]]:
-    equal = _equal(assembly)
-    return [planets for planets in planet_families(assembly.bodies) if planets not in equal]
-
-
 def _equal_supports(assembly: Assembly) -> list[PlanetSupports]:
     """Catalogue bearings of equal planets."""
     found = []
@@ -290,7 +287,7 @@ def _equal_supports(assembly: Assembly) -> list[PlanetSupports]:
         names = [planet.name for planet in planets]
         angles = np.array([planet.orbit_angle for planet in planets])
         found += planet_supports(assembly.supports, names, angles)
-    return [own for own in found if all(is_catalogued(assembly.supports[n]) for n in own.numbers)]
+    return [point for point in found if all(is_catalogued(assembly.supports[n]) for n in point.numbers)]
 
 
 def _what_holds_one_way(laws: Sequence[SupportLaw], names: Sequence[str]) -> str:
@@ -299,9 +296,6 @@ def _what_holds_one_way(laws: Sequence[SupportLaw], names: Sequence[str]) -> str
     if not one_way:
         return "check for a body supported only through clearances"
     return f"{', '.join(one_way)}: located axially in one direction only; check arrangements and `locates_towards`"
-
-
-# What all catalogue bearings and all meshes of a gearbox bear under its static load
 
 
 def bearing_points(assembly: Assembly) -> tuple[OperatingPoint, ...]:
@@ -325,7 +319,7 @@ def bearing_points(assembly: Assembly) -> tuple[OperatingPoint, ...]:
 def _stated_point(bearing: Bearing) -> OperatingPoint:
     """Operating point of a bearing whose load the file states: along x, the stiffness the same in all directions."""
     assert bearing.catalogue is not None and bearing.catalogue.radial_load_kN is not None
-    force = (KN * bearing.catalogue.radial_load_kN, 0.0, KN * (bearing.catalogue.axial_load_kN or 0.0))
+    force = (si(bearing.catalogue, "radial_load_kN"), 0.0, optional_si(bearing.catalogue, "axial_load_kN") or 0.0)
     displacement = equilibrium(BearingOfRows(catalogue_rows(bearing.catalogue)), force).displacement
     return replace(operating_point(bearing, displacement, False), stiffness=catalogue_stiffness(bearing.catalogue))
 

@@ -16,9 +16,9 @@ from exugear.gearbox.gear_parts import thinning_range
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import operating_range, summarise_loads
 from exugear.gearbox.parts import Bearing, Body, PairSpec
-from exugear.gearbox.sections.connections import CatalogueSection
 from exugear.gearbox.sections.designations import boundary_of
-from exugear.gearbox.units import MM, RPM
+from exugear.gearbox.units import MM, RPM, si
+from exugear.system.bodies.of_gearbox import seat_width
 from fe_ste.geometry.checks import USUAL_TIP_THICKNESS
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.standards.pitting import nominal_contact_stress
@@ -64,7 +64,7 @@ def part_warnings(gearbox: Gearbox) -> Iterator[str]:
 
 def _speed_limits(gearbox: Gearbox) -> Iterator[str]:
     """Compare seals and bearings with their speed limits, at the highest speed of operation and of all load cases."""
-    limited = [one for one in gearbox.bearings if one.catalogue and one.catalogue.speed_limit_rpm]
+    limited = [bearing for bearing in gearbox.bearings if bearing.catalogue and bearing.catalogue.speed_limit_rpm]
     if not gearbox.case.seals and not limited:
         return
     fastest = (operating_range(gearbox) or (0.0, 0.0))[1]
@@ -74,7 +74,7 @@ def _speed_limits(gearbox: Gearbox) -> Iterator[str]:
     at = f"at {fastest / RPM:.4g} rpm of {gearbox.case.overall.input}"
     for name, seal in gearbox.case.seals.items():
         turns = abs(speeds.get(seal.body, 0.0) - speeds.get(seal.on, 0.0))
-        speed = 0.5 * MM * seal.diameter_mm * turns
+        speed = 0.5 * si(seal, "diameter_mm") * turns
         if speed > seal.speed_limit_m_per_s:
             usual = "" if "speed_limit_m_per_s" in seal.model_fields_set else " usual for nitrile rubber (NBR)"
             yield (
@@ -182,12 +182,12 @@ def _seats(gearbox: Gearbox) -> Iterator[str]:
 def _bores_beside(gearbox: Gearbox, body: Body, place: float) -> tuple[float, float] | None:
     """Bores (m) of the nearest bearings of a body on both sides of a place on it; None without both."""
     known = [
-        (bearing.position[2], MM * bearing.catalogue.bore_mm)
+        (bearing.position[2], si(bearing.catalogue, "bore_mm"))
         for bearing in gearbox.bearings
         if bearing.catalogue is not None and bearing.body == body.name
     ]
-    before = [one for one in known if one[0] < place]
-    behind = [one for one in known if one[0] > place]
+    before = [other for other in known if other[0] < place]
+    behind = [other for other in known if other[0] > place]
     if before and behind:
         return (max(before)[1], min(behind)[1])
     return None
@@ -198,10 +198,10 @@ def _shaft_under(gearbox: Gearbox, body: Body, gear: Gear, place: float) -> floa
     section = gearbox.case.bodies.get(body.family)
     if section is None or section.shape is None:
         return None
-    start = MM * section.shape.start_z_mm
+    start = si(section.shape, "start_z_mm")
     found = []
     for piece in section.shape.sections:
-        end = start + MM * piece.length_mm
+        end = start + si(piece, "length_mm")
         if start < place + 0.5 * gear.face_width and end > place - 0.5 * gear.face_width:
             found.append(MM * min(piece.outer_diameter_mm, piece.outer_diameter_end_mm or piece.outer_diameter_mm))
         start = end
@@ -235,22 +235,17 @@ def _faces(gearbox: Gearbox) -> Iterator[str]:
     bodies = gearbox.named_bodies
     reported = set()
     for mesh in gearbox.meshes:
-        places = [
-            bodies[body].wheels.get(gear.name)
-            for body, gear in ((mesh.pinion, mesh.pair.pinion), (mesh.gear, mesh.pair.gear))
-        ]
-        if None in places or mesh.family in reported:
+        pinion, gear = mesh.pair.pinion, mesh.pair.gear
+        if mesh.family in reported:
             continue
-        gears = (mesh.pair.pinion, mesh.pair.gear)
-        low = max(place - 0.5 * gear.face_width for place, gear in zip(places, gears, strict=True) if place is not None)
-        high = min(
-            place + 0.5 * gear.face_width for place, gear in zip(places, gears, strict=True) if place is not None
-        )
+        pinion_z, gear_z = bodies[mesh.pinion].wheels[pinion.name], bodies[mesh.gear].wheels[gear.name]
+        low = max(pinion_z - 0.5 * pinion.face_width, gear_z - 0.5 * gear.face_width)
+        high = min(pinion_z + 0.5 * pinion.face_width, gear_z + 0.5 * gear.face_width)
         if high - low < LEAST_OVERLAP * mesh.pair.face_width:
             reported.add(mesh.family)
             family = bodies[mesh.gear].family
             yield (
-                f"bodies.{family}.gears_z_mm.{gears[1].name} = {1e3 * (places[1] or 0.0):g}: {mesh.family} has "
+                f"bodies.{family}.gears_z_mm.{gear.name} = {1e3 * gear_z:g}: {mesh.family} has "
                 f"{1e3 * max(high - low, 0.0):.4g} mm of its face width in mesh, but {1e3 * mesh.pair.face_width:.4g} "
                 "mm are used; move a gear, or set common_face_width_mm"
             )
@@ -322,7 +317,7 @@ def _clash(gear: Gear, place: float, bearing: Bearing) -> float:
     catalogue = bearing.catalogue
     if catalogue is None:
         return 0.0
-    along = 0.5 * (gear.face_width + _width(catalogue)) - abs(place - bearing.position[2])
+    along = 0.5 * (gear.face_width + seat_width(bearing)) - abs(place - bearing.position[2])
     inside, outside = sorted((0.5 * gear.held_diameter, gear.tip_radius))
     across = min(outside, 0.5e-3 * catalogue.outer_diameter_mm) - max(inside, 0.5e-3 * catalogue.bore_mm)
     if across > LEAST_CLASH and along > CLASHING_SHARE * MM * catalogue.width_mm:
@@ -330,12 +325,7 @@ def _clash(gear: Gear, place: float, bearing: Bearing) -> float:
     return 0.0
 
 
-def _width(catalogue: CatalogueSection) -> float:
-    """Width of a bearing with all its rows, m."""
-    return (1 if catalogue.arrangement == "single" else 2) * MM * catalogue.width_mm
-
-
-# How near gear pairs are to what tables cut off or what wears out: form circles, tips, pressure at the pitch point
+# Margins of gear pairs: form circles, tips, pressure at the pitch point
 
 LEAST_FORM_MARGIN = 0.02
 """Minimum part of a flank between the mating gear's tip and the root form diameter.
@@ -504,12 +494,10 @@ def pair_warnings(gearbox: Gearbox) -> Iterator[str]:
 
 def _clear_tip_diameter(pair: GearPair, mate: Gear) -> float:
     """Tip diameter of a gear, m, that leaves the proposed margin on the other one of its pair."""
-    if mate is pair.gear:
-        other = pair.pinion
-        on_other = other.form_roll_length + PROPOSED_MARGIN * (other.tip_roll_length - other.form_roll_length)
-        roll = on_other + pair.base_tangent_length if mate.internal else pair.base_tangent_length - on_other
-    else:
-        other = pair.gear
-        on_other = other.form_roll_length + PROPOSED_MARGIN * (other.tip_roll_length - other.form_roll_length)
+    other = pair.pinion if mate is pair.gear else pair.gear
+    on_other = other.form_roll_length + PROPOSED_MARGIN * (other.tip_roll_length - other.form_roll_length)
+    if mate is pair.pinion:
         roll = pair.pinion_roll_length(on_other)
+    else:
+        roll = on_other + pair.base_tangent_length if mate.internal else pair.base_tangent_length - on_other
     return 2.0 * math.hypot(mate.base_radius, roll)

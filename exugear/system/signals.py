@@ -451,12 +451,10 @@ def energy_residual(data: xr.Dataset | Mapping[str, Floats]) -> float:
     kinetic = change["kinetic_energy"]
     last = float(data["kinetic_energy"][-1])
     scale = kinetic if abs(kinetic) > STEADY_CHANGE * last else last
-    if scale:
-        return (change["work_of_loads"] - explained) / scale
-    return math.nan
+    return (change["work_of_loads"] - explained) / scale if scale else math.nan
 
 
-# All six components of what supports carry in a run: stored of bearings, derived of ideal joints
+# Loads of supports in a run: stored for bearings, derived for ideal joints
 
 NEEDED = ("time", "input_speed", "mesh_force", "support_force")
 """Signals of a run that loads of ideal joints are derived from."""
@@ -531,13 +529,13 @@ def _joint_moments(assembly: Assembly, run: Mapping[str, Floats]) -> Floats:
     places = _Places(assembly, np.append(0.0, np.cumsum(steps)))
     # What a joint takes of its own body: the file's force less what planets hand on; it acts at the node but for the
     # moments of meshes about that.
-    own = force.copy()
+    loads = force.copy()
     moments = np.zeros_like(force)
     for joint in joints:
         if joint.on in number:
-            own[number[joint.on]] -= force[number[joint.body]]
+            loads[number[joint.on]] -= force[number[joint.body]]
     for n, joint in enumerate(joints):
-        moments[n] = np.cross(places.of(joint.body), own[n])
+        moments[n] = np.cross(places.of(joint.body), loads[n])
     for element, scalar in zip(assembly.elements, np.asarray(run["mesh_force"], dtype=np.float64).T, strict=True):
         rows = element.force.reshape(2, BODY_SIZE)[:, TILT:] / element.line_of_action
         for body, row in zip((element.mesh.pinion, element.mesh.gear), rows, strict=True):

@@ -35,8 +35,6 @@ from fe_ste.tools.display import ReprMixin
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Equations of motion linearised about a state, and their undamped modes
-
 DIFFERENCE_STEP = 1e-6
 """Step of central differences, m or rad, and per second."""
 ROLLING_STEP = 1e-8
@@ -154,8 +152,6 @@ def _tangents(
     damping = np.array([force(zero, -e) - force(zero, e) for e in steps]).T / (2.0 * DIFFERENCE_STEP)
     return stiffness, damping
 
-
-# States in balance: the output locked under load, and the start of a run in uniform acceleration
 
 MOST_NEWTON_STEPS = 30
 """Steps after which the search for a balance is given up."""
@@ -354,8 +350,8 @@ def _check_shoulders(assembly: Assembly, q: Floats) -> None:
     """
     loads = assembly.support_loads_at_rest(q)
     has_rows = np.diff(assembly.connectors.rolling.first) > 0
-    for support, load, own in zip(assembly.supports, loads, has_rows, strict=True):
-        if not own or support.catalogue is None:
+    for support, load, rolling in zip(assembly.supports, loads, has_rows, strict=True):
+        if not rolling or support.catalogue is None:
             continue
         rows = catalogue_rows(support.catalogue)
         if not holds_one_way(rows):

@@ -365,9 +365,7 @@ class Assembly(ReprMixin):
         if not self.travelling.first.size:
             return q, v
         x, u = follow(np.atleast_2d(q), np.atleast_2d(v), self.travelling)
-        if q.ndim > 1:
-            return (x, u)
-        return (x[0], u[0])
+        return (x, u) if q.ndim > 1 else (x[0], u[0])
 
     def mesh_forces(self, q: Floats, v: Floats, meshes: MeshArrays) -> Floats:
         """Generalized forces of meshes, shape (size,), N and N m."""
@@ -502,9 +500,6 @@ class Assembly(ReprMixin):
                     q[elastic_slice], v[elastic_slice], a[elastic_slice]
                 )
         return f
-
-
-# Hash of all that the equations of a variant depend on
 
 
 def input_hash(assembly: Assembly, load_case: str | None = None) -> str:

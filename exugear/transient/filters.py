@@ -26,8 +26,6 @@ from fe_ste.tools.arrays import Complexes, Floats, Integers
 from fe_ste.tools.compilation import kernel
 from fe_ste.tools.octets import SIZE, eight, put
 
-# Low-pass filter and decimation of signals while they are computed
-
 TAPS_PER_FACTOR = 31
 """Length of the anti-aliasing filter per decimation factor: 80 dB above 0.58, flat below 0.42 of the rate."""
 
@@ -130,8 +128,8 @@ class Filter(NamedTuple):
 def plain_filter(factor: int, count: int) -> Filter:
     """Low pass of so many columns before decimation; nothing at all at a factor of 1."""
     taps = low_pass(factor, (TAPS_PER_FACTOR * factor) // 2 if factor > 1 else 0)
-    own = np.repeat(taps[:, None], count, axis=1)
-    return Filter(own, np.zeros_like(own), 0)
+    matrix = np.repeat(taps[:, None], count, axis=1)
+    return Filter(matrix, np.zeros_like(matrix), 0)
 
 
 def _blocks(taps: Floats, before: int) -> tuple[Floats, Integers]:
@@ -216,8 +214,6 @@ class Decimator:
         return centre, results
 
 
-# Filters of stored signals: what is read off predicted states is put right while it is filtered
-
 HALF = 31
 """Rows on either side that the remedy takes at most."""
 ANGLES = np.linspace(0.0, np.pi, 400)
@@ -261,19 +257,19 @@ def stored_filter(assembly: Assembly, method: Method, step: float, factor: int) 
     if not method.is_multistep or np.isnan(lags).all():
         return plain
     half = max(plain.half, TAPS_PER_FACTOR // 2)  # at a factor of 1 nothing else is filtered
-    own = np.pad(plain.own, ((half - plain.half,) * 2, (0, 0)))
+    taps = np.pad(plain.own, ((half - plain.half,) * 2, (0, 0)))
     rows = min(half, HALF)
-    low_pass = own[:, 0].copy()
-    other = np.zeros_like(own)
+    low_pass = taps[:, 0].copy()
+    other = np.zeros_like(taps)
     for lag in np.unique(lags[np.isfinite(lags)]):
-        own[:, lags == lag] += _cascade(low_pass, _remedy(method, lag, rows))[:, None]
+        taps[:, lags == lag] += _cascade(low_pass, _remedy(method, lag, rows))[:, None]
     first = layout["mesh_force"].start
     before = layout["mesh_force"].start - layout["mesh_dte"].start
     for m in _meshes(assembly):
         element = assembly.elements[m]
         remedy = _remedy_of_force(method, element.tangent.mean(), element.damping / step, rows)
         other[:, first + m] = element.line_of_action * _cascade(low_pass, remedy)
-    return Filter(own, other, before)
+    return Filter(taps, other, before)
 
 
 def _meshes(assembly: Assembly) -> Integers:
@@ -310,7 +306,7 @@ def _remedy_of_force(method: Method, stiffness: float, damping: float, half: int
     The force changes by stiffness and damping times what the correction does to deflection and rate.
     """
     lag = damping / stiffness if stiffness else 0.0
-    error, position = (ahead_of_correction(method, ANGLES, one) for one in (lag, 0.0))
+    error, position = (ahead_of_correction(method, ANGLES, delay) for delay in (lag, 0.0))
     return stiffness * _fitted(-(1.0 + 1j * lag * ANGLES) * error, 1.0 + position, error, half)
 
 

@@ -181,7 +181,7 @@ class Run(ReprMixin):
         return "Run", rows
 
 
-# What a run may claim: limits beyond which its numbers say nothing of a gearbox, judged while it goes on
+# Validity checks of a run
 
 ENERGY, RIM, SPEED, DEFLECTION, ACCOUNT = range(5)
 """Rows of the values of a `ValidityMonitor`; the last holds the initial energy and its scale."""

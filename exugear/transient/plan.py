@@ -23,8 +23,6 @@ from exugear.transient.outcome import RunError
 if TYPE_CHECKING:
     from exugear.transient.exudyn_model.system import MeshRoute
 
-# How large a run is: its samples, steps, memory and disk, checked before anything is allocated or written
-
 SAMPLE_RATE = 20e3
 """Stored rate, Hz."""
 HIGHEST_BAND = 100e3
@@ -128,11 +126,11 @@ def too_fine(step: float, total: float, sample_rate: float) -> str:
     >>> too_fine(1e-12, 30.0, 20e3)
     'step = 1e-12 s: 3e+13 steps, 5e+07 for each stored sample; at most 1000 are permitted, a step of 5e-08 s'
     """
-    each = 1.0 / (step * sample_rate)
-    if each <= MOST_STEPS_PER_SAMPLE * (1.0 + 1e-9):
+    interval = 1.0 / (step * sample_rate)
+    if interval <= MOST_STEPS_PER_SAMPLE * (1.0 + 1e-9):
         return ""
     return (
-        f"step = {step:.3g} s: {total / step:.3g} steps, {each:.3g} for each stored sample; at most "
+        f"step = {step:.3g} s: {total / step:.3g} steps, {interval:.3g} for each stored sample; at most "
         f"{MOST_STEPS_PER_SAMPLE} are permitted, a step of {1.0 / (MOST_STEPS_PER_SAMPLE * sample_rate):.3g} s"
     )
 
@@ -161,7 +159,7 @@ def _span(gearbox: Gearbox, case: LoadCase, duration: float | None) -> tuple[flo
     return case.duration, f"{gearbox.source}: load_cases.{case.name}.duration_s"
 
 
-# What a run is to do: its steps, and what it was run with, as the file keeps it
+# Steps and settings of a run
 
 EXPECTATIONS = ("stability_margin", "expected_error_at_band", "expected_error_of_resonances")
 """Attributes that say what a method and its step are expected to do."""

@@ -21,8 +21,6 @@ from exugear.transient.start import RunStart
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.threads import second_thread
 
-# The account of energy of a run: powers integrated, energies as they are
-
 INTEGRATED = [BALANCE_TERMS.index(term) for term in POWERS]
 """Columns of the account that are integrals of powers."""
 OBSERVED = [BALANCE_TERMS.index(term) for term in ENERGIES]
@@ -87,8 +85,6 @@ class EnergyAccount:
         self.powers, self.balance = powers[-1].copy(), lines[-1]
         return lines
 
-
-# What a run leaves behind: its states turned into signals, filtered, judged and written piece by piece
 
 FLUSH_INTERVAL = 0.25
 """Simulated time between writes to disk, s."""
@@ -286,7 +282,9 @@ class Recorder:
             self._observe_rest(buffer)
             times, rows = buffer.states()
             self._observer.complete(rows.q, rows.v, rows.signals)
-            written = self._lines_to_write(len(times))
+            count = len(times)
+            stride = max(1, round(FLUSH_INTERVAL / self._plan.step))
+            written = np.unique(np.append(np.arange(0, count, stride), count - 1))
             # A solver that observes its steps leaves out the energies, which are asked for seldom.
             _, energies, _ = self._observer.observe(times[written], rows.q[written], rows.v[written])
             balances = self._account.carry_on(rows.energies[:, len(ENERGIES) :], written, energies)
@@ -301,11 +299,6 @@ class Recorder:
         self._file.add(pieces.append(self._plan.step * numbers, samples, times[written], balances, state))
         buffer.clear()
         return end
-
-    def _lines_to_write(self, count: int) -> Integers:
-        """Numbers of the lines of the account that are written, of so many: each interval's first, and the last."""
-        stride = max(1, round(FLUSH_INTERVAL / self._plan.step))
-        return np.unique(np.append(np.arange(0, count, stride), count - 1))
 
     def _checkpoint(self, time: float, rows: RowBuffer, past: Floats) -> RunCheckpoint:
         """Restart state: the last of these rows, at a time (s)."""

@@ -38,7 +38,7 @@ from fe_ste.tools.arrays import Floats
 if TYPE_CHECKING:
     from exugear.transient.exudyn_model.system import MeshRoute
 
-# Ctrl-C and its like end a run after its step instead of tearing it down
+# Interruption: Ctrl-C ends a run after the current step
 
 SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
 """Signals that end a run; the last two where the program that runs it listens to them itself."""
@@ -78,7 +78,7 @@ def interruptible() -> Iterator[StopRequest]:
             signal.signal(number, handler)
 
 
-# A run from its start to its end, or to the first error or interruption, by either solver
+# Integration of a run by either solver until its end, an error or an interruption
 
 STEPS_AT_ONCE = 2000
 """Steps of one call of the compiled solver: Ctrl-C is heard between calls, and a step takes up to half a ms."""
@@ -121,7 +121,7 @@ def _integrate_in_exudyn(plan: RunPlan, start: RunStart, recorder: Recorder, int
 
     state = start.state
     step = plan.step
-    system = ExudynSystem(plan.assembly, state.q, state.v, start.loads.as_functions(), plan.mesh_route)
+    system = ExudynSystem(plan.assembly, state.q, state.v, start.loads, plan.mesh_route)
     follow = _StepFollower(plan, start, recorder, interruption)
     try:
         system.run(state.step * step, plan.steps - state.step, step, follow, not plan.is_implicit)
@@ -158,8 +158,6 @@ class _StepFollower:
         recorder.keep(t, q, v)
         return not self._interruption.asked and not recorder.halted
 
-
-# Load cases in time: start in balance, integrate, stream the results
 
 Solver = Literal["compiled", "exudyn"]
 Integrator = Literal["adams", "rk4"]
@@ -298,6 +296,4 @@ def _solver(asked: str | None, assembly: Assembly, mesh_route: str) -> str:
     reason = unsupported_reason(assembly) if mesh_route == "element" else "user-function loads exist in Exudyn only"
     if asked == "compiled" and reason:
         raise RunError(f"the compiled solver cannot run this: {reason}; use --solver exudyn")
-    if reason:
-        return "exudyn"
-    return asked or "compiled"
+    return "exudyn" if reason else asked or "compiled"

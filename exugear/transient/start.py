@@ -31,7 +31,7 @@ from exugear.results.run_file import (
     kept_attributes,
     load_run,
 )
-from exugear.system.loads import DriveLaw, LoadTable
+from exugear.system.loads import Drive, LoadTable
 from exugear.system.signals import BALANCE_TERMS, MESH_TIMES, POWERS, SignalLayout, signal_layout
 from exugear.system.statics import accelerating_start
 from exugear.system.system import Assembly
@@ -40,8 +40,6 @@ from exugear.transient.outcome import RunError, ValidityMonitor
 from exugear.transient.plan import EXPECTATIONS, RunPlan
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.files import FileError, exclusive
-
-# The folder of a run: one process at a time, and nothing lost
 
 LOCK_NAME = "run.partial.lock"
 
@@ -102,9 +100,6 @@ def refuse_shorter(directory: Path, duration: float) -> str:
     return f"{directory / PARTIAL_NAME}: has reached {reached:.4g} s; a duration of {duration:g} s ends before that"
 
 
-# Where a run starts from and what acts on it, anew or from the last piece of a run that was stopped
-
-
 @dataclass(frozen=True, eq=False)
 class RunStart:
     """A run that can begin."""
@@ -139,7 +134,10 @@ def prepare_start(plan: RunPlan, resume: bool) -> RunStart:
         pieces = _pieces_to_resume(plan, layout)
         pieces.note("duration", plan.duration)
         state = pieces.last_checkpoint()
-        _take_over_judgement(plan, judge, state)
+        judge.figures = state.judgement
+        if judge.stop:
+            reasons = judge.reasons(state.mesh_times, state.step * plan.step)
+            raise RunError(f"{plan.partial_path}: aborted: {'; '.join(reasons)}; run it again without --resume")
     else:
         state = _first_state(assembly, case, series, layout, judge)
         (plan.directory / EARLIER_PARTIAL_NAME).unlink(missing_ok=True)
@@ -167,13 +165,6 @@ def _pieces_to_resume(plan: RunPlan, layout: SignalLayout) -> RunPieces:
                 f"{plan.partial_path}: was run with {key} = {kept}, not {value}; run it again without --resume"
             )
     return pieces
-
-
-def _take_over_judgement(plan: RunPlan, judge: ValidityMonitor, state: RunCheckpoint) -> None:
-    judge.figures = state.judgement
-    if judge.stop:
-        reasons = judge.reasons(state.mesh_times, state.step * plan.step)
-        raise RunError(f"{plan.partial_path}: aborted: {'; '.join(reasons)}; run it again without --resume")
 
 
 def _first_state(
@@ -213,7 +204,7 @@ def _load_table(
     """Gather what acts from outside; a drive starts ahead by an angle (rad)."""
     drive = None
     if case.driven_body is not None and case.drive_stiffness is not None:
-        drive = DriveLaw(
+        drive = Drive(
             body=case.driven_body,
             stiffness=case.drive_stiffness,
             damping=gearbox.case.damping.coupling_time_s * case.drive_stiffness,

@@ -30,7 +30,6 @@ from fe_ste.tools.display import ReprMixin
 if TYPE_CHECKING:
     from fe_ste.elasticity.flank import FlankCompliance
 
-# Near field of the contact cells: both flanks as elastic half-spaces under uniform cell pressures
 
 #: Beyond this many half sides a cell acts as its resultant with its second moments (error below 2e-3 of its part).
 #: Slices are two half sides apart, so that rounding never decides which formula holds.
@@ -240,8 +239,6 @@ def _evaluate(sums: Floats, series: Floats, across: Floats, half: Floats, count:
         sums[n] += value + half[n] * half[n] * moment
 
 
-# The regular part of a gear's compliance, on contact cells: that of tooth, rim and neighbours without the near field
-
 #: Indices without a sign: one with a sign counts from the end if it is negative, which numba would ask at each use.
 Places: TypeAlias = NDArray[np.uintp]
 _ONE = np.uintp(1)
@@ -393,9 +390,6 @@ def _sum_four(result: Floats, rows: Floats, first: np.uintp, weights: Floats) ->
     weight_3 = weights[3]
     for q in range(len(result)):
         result[q] = weight_0 * row_0[q] + weight_1 * row_1[q] + weight_2 * row_2[q] + weight_3 * row_3[q]
-
-
-# Compliance of the contact cells of a gear pair: near field of half-spaces, and the regular part of both flanks
 
 
 def compliance_matrix(

@@ -166,8 +166,6 @@ def circle_limit(pair: FlankPair, radius: float, axial: float, tooth: int, rotat
     return 0.5 * (low + high)
 
 
-# Cells over the plane of action, in which pressures are looked for; frame and signs as in `fe_ste.contact.kinematics`
-
 #: A cell cut by a tip edge to less than this part of its width is joined to its neighbour: so narrow a cell would
 #: have a pressure of its own that is all rounding.
 _LEAST_CELL = 0.2
@@ -297,8 +295,6 @@ def lay_cells(
     return Cells(tooth, layer, np.sqrt(2.0 * middle / pair.base_radius_1), gear_roll, half, gap, cut, offset)
 
 
-# Where contact meets the end of the involute: what is cut off at the form circles, and how much load that was
-
 Flanks: TypeAlias = "tuple[FlankCompliance, FlankCompliance]"
 """Loaded flanks of gear 1 and gear 2."""
 
@@ -351,9 +347,7 @@ def _form_roll(flank: FlankCompliance) -> float:
 
 def _above(flank: FlankCompliance, roll: Floats) -> Floats:
     """Roll angles by which points of a gear lie on the flank side of the form diameter."""
-    if flank.gear.internal:
-        return _form_roll(flank) - roll
-    return roll - _form_roll(flank)
+    return _form_roll(flank) - roll if flank.gear.internal else roll - _form_roll(flank)
 
 
 def _parts_beyond(flanks: Flanks, cells: Cells) -> Floats:

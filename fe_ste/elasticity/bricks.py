@@ -174,8 +174,6 @@ def _condense_bubbles(stiffness: Floats) -> Floats:
     )
 
 
-# Errors of bricks under the loads on a flank, caused by the size of the elements next to the load
-
 #: Layers on either side of a load for which its error is evaluated, and elements from a load to the faces of the
 # block.
 ERROR_REACH = 3
@@ -363,8 +361,6 @@ def _surface_displacement(mesh: SectorMesh, side: int) -> Floats:
     read = integrals.reshape(shape)[:, 1:-1, :, len(layers) // 2]
     return np.asarray(read * (1.0 - material.poissons_ratio**2) / (np.pi * material.youngs_modulus))
 
-
-# Additional errors of bricks under loads near an end face, compared with loads inside the face width
 
 #: Number of wave numbers, and of nodes along the profile over which errors are evaluated.
 WAVES = 8

@@ -48,8 +48,6 @@ from fe_ste.elimination import (
 from fe_ste.tools.arrays import Floats, Integers, SparseMatrix
 from fe_ste.tools.threads import side_by_side
 
-# Joining equal tooth sectors to an open chain or to the closed ring
-
 
 class Chain(NamedTuple):
     """Equal sectors in a row, or one: stiffness (m, m) of the plus face in even and in odd deformations, N/m."""
@@ -221,8 +219,6 @@ def uniform_faces(sector: Chain, load: Chain, signs: Floats) -> Floats:
     return np.concatenate(list(parts)) / 2
 
 
-# Elements of a sector mesh layer by layer, in the frame that turns with the section along the helix
-
 #: Part of the face width by which heights of layers may differ and count as equal.
 _ROUNDING = 1e-12
 
@@ -308,8 +304,6 @@ def _layer(
     blocks = stiffness.reshape(-1, 8, 3, 8, 3).transpose(0, 1, 3, 2, 4)
     return corners, above, np.asarray(turns.transpose(0, 1, 3, 2)[:, :, None] @ blocks @ turns[:, None])
 
-
-# The even and the odd half of a tooth sector, condensed onto a cut face, loads and read-outs
 
 #: Blocks of a set of cells that is not dissected any more.
 _LEAF_BLOCKS = 12
@@ -556,9 +550,6 @@ def _mirror_images(mesh: SectorMesh) -> Integers:
             f"{missed:.3g} m; it must be the same"
         )
     return images
-
-
-# One tooth sector condensed onto its cut faces, with loads and displacements of its flank
 
 
 @dataclass(frozen=True)

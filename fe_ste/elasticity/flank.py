@@ -269,7 +269,7 @@ def flank_images(gear: Gear, side: int) -> Floats:
     return np.stack([wedge_images(np.pi / 2 + lean, ratio), wedge_images(np.pi / 2 - lean, ratio)])
 
 
-# Flanks computed once: both flanks of a gear from one, kept in memory and in files for the next process
+# Stored flanks: both flanks of a gear are computed once
 
 #: Packages whose sources determine the results.
 _ROOMS = ("tools", "geometry", "elimination", "elasticity")

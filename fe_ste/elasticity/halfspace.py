@@ -128,9 +128,7 @@ def _weighted_difference(x: float, high: float, low: float, to_high: float, to_l
     above = abs(high) + to_high
     below = abs(low) + to_low
     if (high < 0.0) == (low < 0.0):
-        if high >= 0.0:
-            return x * math.log(above / below)
-        return x * math.log(below / above)
+        return x * math.log(above / below) if high >= 0.0 else x * math.log(below / above)
     return x * math.log(above * below / (x * x))
 
 

@@ -408,9 +408,7 @@ class GearInputs:
             profile_angle = np.arccos(self.base_radius / np.asarray(radius, dtype=np.float64))
         fall = np.tan(profile_angle) - profile_angle - involute(self.transverse_pressure_angle)
         half_angle = self.reference_half_angle - self.outward * fall
-        if isinstance(radius, np.ndarray):
-            return half_angle
-        return float(half_angle)
+        return half_angle if isinstance(radius, np.ndarray) else float(half_angle)
 
 
 # Root fillet of a tooth in the transverse section

@@ -84,8 +84,6 @@ def inverse_involute(value: float) -> float:
     return angle
 
 
-# Curve that the rounded tip of a rack cuts into the root of a gear, and where it meets the involute
-
 SAMPLES = 2001
 """Points of the curve among which its crossing with the involute is looked for."""
 
@@ -165,8 +163,6 @@ class RackTipCut:
         profile_angle = np.arccos(self.base_radius / np.where(above, radius, self.base_radius))
         return np.asarray(~above | (angle < self.base_half_angle - involute(profile_angle)))
 
-
-# Pinion-type cutter of an internal gear: what its rounded tip leaves at the root, and whether it spoils the tips
 
 POSITIONS = 4001
 """Positions of the cutter at which a corner of the gear's tips is checked."""

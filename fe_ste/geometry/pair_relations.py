@@ -164,7 +164,7 @@ class UncheckedPair:
         return self.pinion.angular_pitch * r_1 - thickness
 
 
-# Way of a tip's corners past the root fillet of its mate
+# Clearance of tip corners from the root fillet of the mating gear
 
 FILLET_TOLERANCE = 1e-5
 """Error of the fillet as a polygon when a tip corner is led past it, in normal modules."""
@@ -219,7 +219,7 @@ def _corner_gap(
     return float(np.min(seen_radius * (mate_tooth - half_angle - seen_angle)))
 
 
-# Inputs of gears that follow from their mates: profile shifts from centre distances, tips that keep clear
+# Inputs that follow from the mating gear: profile shift from the centre distance, shortened tip
 
 ROOT_MARGIN = 0.1
 """Roll length between an automatically shortened tip and the root form diameter of the mating gear, in normal modules:

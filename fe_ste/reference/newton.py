@@ -22,8 +22,6 @@ from fe_ste.tools.arrays import Booleans, Floats, Integers, SparseMatrix
 from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.threads import one_dense_thread
 
-# Elastic bodies in contact as data: what is asked, and the equilibrium that answers it
-
 
 @dataclass(frozen=True)
 class TurningHub:
@@ -141,8 +139,6 @@ def convergence_table(iterations: Sequence[Iteration]) -> str:
     ]
     return "\n".join([head, *rows])
 
-
-# Equilibrium of elastic bricks in frictionless contact: Newton's method with a primal-dual active set
 
 #: Stiffness added on active gaps, in Young's moduli times the node's width: the more, the fewer solves a step takes.
 _AUGMENTATION = 1000.0

@@ -78,9 +78,7 @@ class NonlinearSettings(ReprMixin):
     def bodies(self) -> str:
         """Modelled part of the gears, as text."""
         bodies = "whole gears" if self.closed else "open sectors"
-        if self.teeth is None:
-            return bodies
-        return f"{bodies} with {self.teeth} teeth meshed"
+        return bodies if self.teeth is None else f"{bodies} with {self.teeth} teeth meshed"
 
     @property
     def strains(self) -> str:
@@ -280,8 +278,6 @@ def _contact_stress(
     return stresses
 
 
-# Stresses in meshing teeth at one position, from the reference analysis or under the superelement's pressures
-
 #: Points across a contact cell at which its force acts.
 _POINTS_ACROSS = 5
 
@@ -315,9 +311,7 @@ class StressField(ReprMixin):
     def nodes_of(self, number: int) -> slice:
         """Place of the nodes of gear 1 (`number` 0) or gear 2 (1) in the nodal values."""
         pinion_nodes = len(self.sectors[0].points)
-        if number:
-            return slice(pinion_nodes, None)
-        return slice(0, pinion_nodes)
+        return slice(pinion_nodes, None) if number else slice(0, pinion_nodes)
 
     def _line(self) -> str:
         return (

@@ -17,8 +17,6 @@ from typing import Literal
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 
-# Mesh stiffness by ISO 6336-1 method B, for comparison with the finite elements
-
 _STEEL = 206e9
 """Young's modulus behind the series, Pa."""
 _PER_WIDTH = 1e9
@@ -202,8 +200,6 @@ def outside_scope(pair: GearPair) -> str:
         return f"transverse contact ratio {pair.transverse_contact_ratio:.3f} is below 1, outside the scope of ISO 6336"
     return ""
 
-
-# Load factors of ISO 6336-1:2006 by method B: K_v, K_Hbeta, K_Halpha and K_Falpha, with what running in takes away
 
 Hardening = Literal["case_hardened", "through_hardened"]
 """Steels that the standard has constants of."""
@@ -396,9 +392,7 @@ def face_load_factor(line_load: float, stiffness: float, misalignment: float) ->
     (1.5, 4.0)
     """
     wedge = stiffness * misalignment / (2.0 * line_load)
-    if wedge <= 1.0:
-        return 1.0 + wedge
-    return 2.0 * math.sqrt(wedge)
+    return 1.0 + wedge if wedge <= 1.0 else 2.0 * math.sqrt(wedge)
 
 
 def transverse_load_factors(

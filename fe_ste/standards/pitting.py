@@ -76,9 +76,7 @@ def single_contact_factors(pair: GearPair, auxiliary_factor: float = 1.0) -> tup
     slope = math.tan(pair.working_pressure_angle)
     helical = math.sqrt(auxiliary_factor)
     if overlap >= 1.0:
-        if pair.gear.internal:
-            return helical, 1.0
-        return helical, helical
+        return (helical, 1.0) if pair.gear.internal else (helical, helical)
     one, two = (
         math.sqrt((gear.tip_radius / gear.base_radius) ** 2 - 1.0) * gear.outward for gear in (pair.pinion, pair.gear)
     )

@@ -145,9 +145,7 @@ def helix_factor(helix_angle: float, overlap: float, edition: Edition = "ISO 633
     """
     angle = min(abs(helix_angle), _LARGEST_HELIX)
     factor = 1.0 - min(overlap, 1.0) * angle / math.radians(120.0)
-    if edition == "ISO 6336:2006":
-        return factor
-    return float(factor / math.cos(angle) ** 3)
+    return factor if edition == "ISO 6336:2006" else float(factor / math.cos(angle) ** 3)
 
 
 def rim_factor(gear: Gear) -> float:
@@ -259,7 +257,7 @@ def _rack_radius(gear: Gear) -> float:
     return radius + float(reach**1.95) / (3.156 * 1.036**cutter.teeth)
 
 
-# What a tooth root withstands beside its material, by ISO 6336-3:2006 method B: Y_delta_rel_T, Y_R_rel_T and Y_X
+# Permissible tooth root stress, ISO 6336-3:2006 method B: Y_delta_rel_T, Y_R_rel_T and Y_X
 
 _TEST_NOTCH = 2.5
 """q_s of the test gears."""

@@ -143,9 +143,6 @@ def mean_contact_stress(pair: GearPair, curve: xr.Dataset) -> xr.DataArray:
     return load.isel(axial_position=0, drop=True).copy(data=mean)
 
 
-# How evenly a mesh carries its load along the face
-
-
 def load_along_face(states: xr.Dataset) -> xr.DataArray:
     """Line load over the face, N/m: that of all tooth pairs together, mean of the mesh cycle.
 

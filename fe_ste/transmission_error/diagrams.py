@@ -197,7 +197,7 @@ def mark_not_converged(panel: Axes, pmc: Floats, height: Floats) -> None:
     panel.legend(loc="best")
 
 
-# One quantity of one table on the axes of the caller, for `MeshTable.plot`
+# One quantity of a table on given axes, for `MeshTable.plot`
 
 KINDS = {
     "ste": ("ste", "Static transmission error / µm", 1e6),
@@ -314,6 +314,4 @@ def _order_along_way(share: Floats) -> list[int]:
     ascending = float(np.abs(last[:-1] - first[1:]).sum())
     descending = float(np.abs(last[1:] - first[:-1]).sum())
     rows = list(range(share.shape[0]))
-    if ascending <= descending:
-        return rows
-    return rows[::-1]
+    return rows if ascending <= descending else rows[::-1]

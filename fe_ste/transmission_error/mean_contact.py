@@ -40,8 +40,6 @@ from fe_ste.transmission_error.transmission_error import solve_positions
 if TYPE_CHECKING:
     import xarray as xr
 
-# Contact of a pair about the state that it stands in: means over the mesh cycle, and their slopes by misalignment
-
 POSITIONS = 5
 """Positions of the mesh cycle for means: twice as many move the misalignment of a gearbox in balance by 0.4 %."""
 FINER = 4
@@ -269,7 +267,7 @@ def _compliance(pair: GearPair, mesh: MeshSettings, contact: ContactSettings) ->
     return pair_compliance(pair, mesh, contact)
 
 
-# Contacts about a state solved once: kept in memory, and in files for the next process, beside the flanks of gears
+# Stored contacts about a state
 
 #: Each takes 4 kB.
 _contacts = Cache[MeanContact]("contact", in_memory=1000, in_files=20_000_000)

@@ -429,7 +429,7 @@ def normal_load(pair: GearPair, torque: float) -> float:
     return torque / (pair.pinion.base_radius * math.cos(pair.pinion.base_helix_angle))
 
 
-# Pressure at the pitch point by Hertz: what the greatest pressure of a table is compared with
+# Hertzian pressure at the pitch point, the reference for the maximum pressure of a table
 
 
 def pitch_point_pressure(pair: GearPair, torque: float) -> float:

@@ -25,8 +25,6 @@ from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 if TYPE_CHECKING:
     import xarray as xr
 
-# States of a table that are not solved: how many may be missing, and what stands in for them where they are few
-
 MOST_MISSING = 0.1
 """Part of the positions of a mesh cycle, or of the states of a table, that may be missing."""
 DOUBTFUL_CUT_OFF = 0.01
@@ -141,8 +139,6 @@ def _check(missing: int, count: int, what: str) -> None:
             f"{100.0 * MOST_MISSING:g} % can be interpolated"
         )
 
-
-# Static transmission error between the nodes of a table: one smooth surface over load, position and gear position
 
 STENCIL = 4
 """Nodes of an axis that act between two of them."""

@@ -93,9 +93,7 @@ def with_additions(path: str | Path, additions: Iterable[Addition]) -> bytes:
     with _errors_naming(path):
         member, unpacked = _member(content)
         new = put_additions(unpacked, placed)
-    if _is_archive(content):
-        return _repacked(content, member, new)
-    return new
+    return _repacked(content, member, new) if _is_archive(content) else new
 
 
 def rounded(value: AdditionValue) -> AdditionValue:
@@ -109,7 +107,7 @@ def rounded(value: AdditionValue) -> AdditionValue:
     if isinstance(value, str):
         return value
     if isinstance(value, tuple):
-        return tuple(float(f"{one:.10g}") + 0.0 for one in value)
+        return tuple(float(f"{number:.10g}") + 0.0 for number in value)
     return float(f"{value:.10g}") + 0.0
 
 
@@ -118,8 +116,8 @@ def _repacked(content: bytes, member: str, new: bytes) -> bytes:
     packed = io.BytesIO()
     with _damage_reported(), zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(packed, "w") as target:
         target.comment = old.comment
-        members = sorted(old.infolist(), key=lambda one: one.header_offset)
-        stops = [*(one.header_offset for one in members[1:]), old.start_dir]
+        members = sorted(old.infolist(), key=lambda member: member.header_offset)
+        stops = [*(member.header_offset for member in members[1:]), old.start_dir]
         for one, stop in zip(members, stops, strict=True):
             if one.filename == member:
                 target.writestr(one, new)

@@ -17,8 +17,6 @@ LAST_VERSION = (2, 0)
 OWN = "custom_exugear_"
 """Prefix of attributes for which REXS has no name; other programs ignore them."""
 
-# Attributes that are read
-
 
 class Row(NamedTuple):
     """An attribute that is read; those without a key enter conversions of several attributes."""
@@ -212,8 +210,6 @@ UNITS = {row.attribute: row.unit for row in _ROWS}
 ATTRIBUTES = {row.older: row.attribute for row in _ROWS if row.older}
 """Current name of an attribute by its old name, for those that are read."""
 
-# Results that are exported
-
 Version = tuple[int, int]
 
 
@@ -291,8 +287,6 @@ RESULTS: Mapping[str, Result] = {
     "contact_pressure": Result("MPa", {(1, 3): "maximum_hertzian_pressure_inner_ring"}),
 }
 """Results by their own names, from the attribute lists of REXS 1.0 to 2.0."""
-
-# Types of components
 
 TYPES = {
     "flank_geometry": "cylindrical_gear_flank",

@@ -69,7 +69,7 @@ def decoded(content: bytes) -> Decoded:
     >>> decoded('<?xml version="1.0" encoding="ISO-8859-1"?><a>ä</a>'.encode("latin-1"))[1:]
     ('iso8859-1', '<?xml version="1.0" encoding="ISO-8859-1"?><a>ä</a>')
     """
-    mark, encoding = next((one for one in _BYTE_ORDER_MARKS if content.startswith(one[0])), (b"", ""))
+    mark, encoding = next((mark for mark in _BYTE_ORDER_MARKS if content.startswith(mark[0])), (b"", ""))
     encoding = encoding or _without_mark(content)
     try:
         return Decoded(mark, encoding, content[len(mark) :].decode(encoding))
@@ -320,9 +320,7 @@ class _Json:
 
 def _whole_number(digits: str) -> int | float:
     """Whole number; to save time, one with more digits than any id is a float, which may be infinite."""
-    if len(digits) < LONGEST_WHOLE:
-        return int(digits)
-    return float(digits)
+    return int(digits) if len(digits) < LONGEST_WHOLE else float(digits)
 
 
 def _no_number(text: str) -> float:
@@ -390,8 +388,6 @@ def document_of(content: bytes) -> Document:
     raise RexsError("not a REXS file: neither XML nor JSON nor a zip archive of one of them")
 
 
-# Model of a document
-
 _FORBIDDEN = ("data_source", "referenced_component_id")
 
 
@@ -426,8 +422,8 @@ def parse_model(content: bytes) -> Model:
         RexsLoadCase(
             number,
             {
-                _component_number(document, one): _attributes(document, one)
-                for one in document.children(node, "changes")
+                _component_number(document, changed): _attributes(document, changed)
+                for changed in document.children(node, "changes")
             },
         )
         for number, node in _load_cases(document)
@@ -440,7 +436,7 @@ def _check_version(version: str) -> None:
     match = re.fullmatch(r"(\d{1,3})\.(\d{1,3})(\.\d{1,3})?", version)
     number = (int(match[1]), int(match[2])) if match else (0, 0)
     if not LEAST_VERSION <= number <= LAST_VERSION:
-        least, last = (".".join(map(str, one)) for one in (LEAST_VERSION, LAST_VERSION))
+        least, last = (".".join(map(str, pair)) for pair in (LEAST_VERSION, LAST_VERSION))
         raise RexsError(f"the file is of REXS version '{plain(version)}'; versions {least} to {last} can be read")
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from exugear.exchange.rexs.mapping import UNITS
+from exugear.gearbox.reading import ListedErrors
 from exugear.gearbox.units import unit_of
 from fe_ste.tools.display import ReprMixin
 
@@ -35,27 +36,14 @@ def unit_factor(unit: str, wanted: str) -> float | None:
 
 # Errors of a REXS file: one clear sentence each, reported together
 
-SHOWN_ERRORS = 20
-"""Maximum number of errors that a message shows."""
 LONGEST_TEXT = 80
 """Maximum number of characters of a file's text in a message or comment."""
 
 
-class RexsError(ValueError):
-    """A REXS file that cannot be read or imported.
+class RexsError(ListedErrors):
+    """A REXS file that cannot be read or imported; the message has one sentence per error."""
 
-    Attributes
-    ----------
-    errors : tuple of str
-        All errors, one sentence each; the message shows the first `SHOWN_ERRORS`.
-    """
-
-    def __init__(self, *errors: str) -> None:
-        self.errors = tuple(dict.fromkeys(errors))
-        more = len(self.errors) - SHOWN_ERRORS
-        many = "s" if more > 1 else ""
-        rest = [f"and {more} more error{many}"] if more > 0 else []
-        super().__init__("\n".join([*self.errors[:SHOWN_ERRORS], *rest]))
+    shown = 20
 
 
 class Errors(list[str]):
@@ -91,12 +79,8 @@ def plain(text: object, longest: int = LONGEST_TEXT) -> str:
     """
     words = "".join(sign if sign.isprintable() else " " for sign in str(text)[: 4 * longest]).split()
     line = " ".join(words).encode("utf-8", errors="replace").decode("utf-8")
-    if len(line) <= longest:
-        return line
-    return f"{line[: longest - 1]}…"
+    return line if len(line) <= longest else f"{line[: longest - 1]}…"
 
-
-# Content of a REXS file: components with attributes, relations between them, load cases
 
 LARGEST_NUMBER = 1e40
 """Limit of numbers that represent physical quantities; files write 1e23 for rigid. Powers of it are still finite."""
@@ -295,7 +279,7 @@ class Model(ReprMixin, line=" REXS {version}: {components!n} components, {relati
     def related(self, relation: str, role: str, number: int, wanted: str) -> tuple[Component, ...]:
         """Return the components in the role `wanted` of all relations in which a component has a role."""
         found = self._relations_by_role.get((relation, role, number), ())
-        return tuple(self.components[one.roles[wanted]] for one in found if wanted in one.roles)
+        return tuple(self.components[relation.roles[wanted]] for relation in found if wanted in relation.roles)
 
     def parts_of(self, owner: Component, kind: str) -> list[Component]:
         """Return the parts of a type in the assembly of a component."""
@@ -308,7 +292,7 @@ class Model(ReprMixin, line=" REXS {version}: {components!n} components, {relati
     @cached_property
     def _relations_by_role(self) -> dict[tuple[str, str, int], list[Relation]]:
         by_role: dict[tuple[str, str, int], list[Relation]] = {}
-        for relation in sorted(self.relations, key=lambda one: one.order):
+        for relation in sorted(self.relations, key=lambda relation: relation.order):
             for role, number in relation.roles.items():
                 by_role.setdefault((relation.type, role, number), []).append(relation)
         return by_role

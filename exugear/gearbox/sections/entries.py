@@ -17,8 +17,6 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from fe_ste.tools.display import html_table
 
-# Kinds of quantities in a gearbox file, with possible and usual values
-
 
 @dataclass(frozen=True)
 class Range:
@@ -56,9 +54,7 @@ class Range:
 
     @property
     def _reason(self) -> str:
-        if self.why:
-            return f" ({self.why})"
-        return ""
+        return f" ({self.why})" if self.why else ""
 
 
 def _symmetric_range(limit: float, usual: float, why: str = "") -> Range:
@@ -225,8 +221,6 @@ def _plain(kind: Any) -> Any:
     return get_origin(kind) or kind
 
 
-# Common definitions of all sections: names, texts, tables of named entries; unknown keys are refused
-
 GROUND = "ground"
 """Name of the stationary environment, used in place of a body."""
 MOST_ENTRIES = 500
@@ -258,9 +252,7 @@ class Section(BaseModel):
     def __repr__(self) -> str:
         """Return one short line with the keys that were specified."""
         line = f"<{type(self).__name__}: {', '.join(f'{key} = {value}' for key, value in self._given().items())}>"
-        if len(line) <= LONGEST_LINE:
-            return line
-        return f"{line[: LONGEST_LINE - 2]}…>"
+        return line if len(line) <= LONGEST_LINE else f"{line[: LONGEST_LINE - 2]}…>"
 
     def __str__(self) -> str:
         """Return the line of `repr`."""
@@ -282,9 +274,7 @@ def _shown(value: Any) -> str:
     if isinstance(value, Mapping) or (isinstance(value, tuple) and len(value) > 3):
         return f"{len(value)} entries"
     text = repr(value)
-    if len(text) <= LONGEST_VALUE:
-        return text
-    return f"{text[: LONGEST_VALUE - 1]}…"
+    return text if len(text) <= LONGEST_VALUE else f"{text[: LONGEST_VALUE - 1]}…"
 
 
 def check_wall(inner: float, outer: float, keys: str) -> None:

@@ -94,7 +94,7 @@ class SourceSection(Section):
         ways = ("hours_per_year", "events_per_year", "hours_table", "wind")
         given = sum(getattr(self, way) is not None for way in ways)
         points = (self.torque_N_m, self.speed_rpm, self.hours)
-        stated = [own for own in points if own is not None]
+        stated = [point for point in points if point is not None]
         if (self.file is not None) + (self.files is not None) + bool(stated) != 1:
             raise ValueError("a source requires file, files, or torque_N_m with speed_rpm and hours; set one of them")
         if stated and len({len(own) for own in stated}) + len(points) - len(stated) != 1:
@@ -190,8 +190,8 @@ class StrengthSection(Section):
 
     @model_validator(mode="after")
     def _curves(self) -> StrengthSection:
-        own = (self.contact_curve is not None, self.bending_curve is not None)
-        if (self.curve is None) != all(own) or (self.curve is not None and any(own)):
+        curves = (self.contact_curve is not None, self.bending_curve is not None)
+        if (self.curve is None) != all(curves) or (self.curve is not None and any(curves)):
             raise ValueError("set curve, or contact_curve and bending_curve")
         for key in ("contact_curve", "bending_curve"):
             points = getattr(self, key) or ()
@@ -243,9 +243,7 @@ class RatingSection(Section):
     @field_validator("edition", mode="before")
     @classmethod
     def _edition_of_year(cls, value: Any) -> Any:
-        if str(value) in ("2006", "2019"):
-            return f"ISO 6336:{value}"
-        return value
+        return f"ISO 6336:{value}" if str(value) in ("2006", "2019") else value
 
     @model_validator(mode="after")
     def _edition(self) -> RatingSection:
@@ -266,8 +264,6 @@ class RatingSection(Section):
             )
         return self
 
-
-# Section on the oil of a gearbox, for the rating of flanks and bearings
 
 Cleanliness = Literal["extreme", "high", "normal", "slight", "typical", "severe", "very_severe"]
 

@@ -96,8 +96,8 @@ def tooth_exposures(gearbox: Gearbox, body: str) -> tuple[ToothExposure, ...]:
 def distinct(teeth: Iterable[ToothExposure]) -> tuple[ToothExposure, ...]:
     """Return one entry for equal planets: each gear in each family once."""
     found: dict[tuple[str, str], ToothExposure] = {}
-    for one in teeth:
-        found.setdefault((one.gear, one.family), one)
+    for tooth in teeth:
+        found.setdefault((tooth.gear, tooth.family), tooth)
     return tuple(found.values())
 
 
@@ -131,8 +131,6 @@ def _torque_on(gearbox: Gearbox, body: str) -> dict[str, float]:
         raise gearbox.error(f"loads.body = {body!r}: static_load.locked locks {held}; set the body at the other end")
     return {body: 1.0}
 
-
-# Counted loads of a gearbox: by source, by bin, and as load cycles of rotating parts
 
 EXPONENTS = (3.0, 10.0 / 3.0, 6.61, 8.74)
 """Slopes of S-N curves: steel structures, roller bearings, contact and bending of gears, all over torque."""
@@ -199,9 +197,9 @@ class CountedLoads(ReprMixin, line=" on {body!r}: {sources!n} sources, {distribu
         found = self.distribution
         rows = []
         for sense in (1, -1):
-            own = np.sign(found.torque) == sense
-            turns = float(found.revolutions[own].sum())
-            largest = float(np.abs(found.torque[own]).max(initial=0.0))
+            same_sense = np.sign(found.torque) == sense
+            turns = float(found.revolutions[same_sense].sum())
+            largest = float(np.abs(found.torque[same_sense]).max(initial=0.0))
             for tooth in distinct(self.teeth) if turns else ():
                 rows.append(
                     {
@@ -317,12 +315,14 @@ def write_spectra(counted: CountedLoads, folder: Path) -> list[Path]:
     paths = [write_table(folder / f"{counted.body}.csv", headings, rows)]
     for tooth in distinct(counted.teeth):
         for sense in (1, -1):
-            own = distribution.torque * sense > 0.0
-            if not own.any():
+            same_sense = distribution.torque * sense > 0.0
+            if not same_sense.any():
                 continue
-            forces = abs(distribution.torques(counted.bin_value)[own]) * counted.mesh_forces[tooth.family]
+            forces = abs(distribution.torques(counted.bin_value)[same_sense]) * counted.mesh_forces[tooth.family]
             side = "plus" if sense * tooth.flank > 0 else "minus"
-            lines = zip(forces, distribution.hours[own], distribution.revolutions[own] * tooth.cycles, strict=True)
+            lines = zip(
+                forces, distribution.hours[same_sense], distribution.revolutions[same_sense] * tooth.cycles, strict=True
+            )
             path = folder / f"{tooth.gear}_{tooth.family}_{side}.csv"
             paths.append(write_table(path, ("mesh_force_N", "hours", "cycles"), lines))
     return paths
@@ -356,12 +356,16 @@ def draw_duration(distribution: DurationDistribution, body: str, path: str | Pat
         bars.bar(middle, distribution.hours, width=width, color=COLOURS[0])
         bars.set(xlabel=f"torque on {body} / kN m", ylabel="hours in the life", title="time at each torque")
         for sign, colour, name in ((1.0, COLOURS[0], "positive"), (-1.0, COLOURS[1], "negative")):
-            own = distribution.torque * sign > 0.0
-            if own.any():
-                order = np.argsort(-np.abs(distribution.torque[own]))
-                lasting = np.cumsum(distribution.hours[own][order])
+            same_sense = distribution.torque * sign > 0.0
+            if same_sense.any():
+                order = np.argsort(-np.abs(distribution.torque[same_sense]))
+                lasting = np.cumsum(distribution.hours[same_sense][order])
                 above.step(
-                    lasting, 1e-3 * np.abs(distribution.torque[own][order]), where="pre", color=colour, label=name
+                    lasting,
+                    1e-3 * np.abs(distribution.torque[same_sense][order]),
+                    where="pre",
+                    color=colour,
+                    label=name,
                 )
         above.set(xlabel="hours with at least this torque", ylabel="torque magnitude / kN m", xscale="log")
         above.xaxis.set_major_formatter("{x:g}")

@@ -43,9 +43,7 @@ class DurationDistribution(ReprMixin):
 
     def torques(self, value: str) -> Floats:
         """Return the representative torque of each bin: its ``mean``, or its ``upper`` edge, which is conservative."""
-        if value == "upper":
-            return self.upper
-        return self.torque
+        return self.upper if value == "upper" else self.torque
 
 
 def load_duration(
@@ -238,8 +236,8 @@ class Rainflow(ReprMixin):
         closed = array("d", self._closed)
         if len(self._tail):
             _take(float(self._tail[-1]), stack, closed)
-        for one, other in itertools.pairwise(stack):
-            closed.extend((abs(other - one), 0.5 * (one + other), 0.5))
+        for first, second in itertools.pairwise(stack):
+            closed.extend((abs(second - first), 0.5 * (first + second), 0.5))
         table = np.frombuffer(closed, dtype=np.float64).reshape(-1, 3)
         return table[:, 0], table[:, 1], table[:, 2]
 

@@ -23,8 +23,6 @@ from exugear.life.load_spectrum.counting import Rainflow, equivalent_range
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.display import ReprMixin
 
-# Reduction of load samples during reading: any number of files yields some ten thousand points
-
 HUB_LOADS = 5
 """Rotor loads in addition to torque: forces along x, y, z, moments about x and y."""
 COMPONENTS = ("torque", "force_x", "force_y", "force_z", "moment_x", "moment_y")
@@ -179,9 +177,7 @@ class SamplePool:
     def samples(self) -> Samples:
         """Return all samples, reduced if there are many."""
         found = together(self._parts)
-        if len(found) > MOST_POINTS:
-            return condensed(found, self.extreme)
-        return found
+        return condensed(found, self.extreme) if len(found) > MOST_POINTS else found
 
     def equivalent_ranges(self) -> dict[tuple[str, float], float]:
         """Return the damage-equivalent range at one cycle per second of all files together, by component and slope."""
@@ -276,12 +272,12 @@ class SeriesReader:
             raise self.gearbox.error(
                 f"{self.key}.skip_s: this key is missing; set the time to skip at the start, 0 for none"
             )
-        own = {}
+        channels = {}
         if series.path.suffix.lower() == ".csv":
-            own = {"torque": f"{self.body}_N_m", "speed": f"{self.body}_rpm"}
+            channels = {"torque": f"{self.body}_N_m", "speed": f"{self.body}_rpm"}
         found = []
         for quantity, given in (("torque", self.source.torque), ("speed", self.source.speed)):
-            name = given or own.get(quantity)
+            name = given or channels.get(quantity)
             if name is None:
                 shown = ", ".join(series.names[:8])
                 raise self.gearbox.error(

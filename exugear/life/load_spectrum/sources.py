@@ -131,8 +131,6 @@ def _share(model: Model, case: RexsLoadCase, where: str) -> float:
     raise RexsError(f"{where}: no operating_time_fraction of the gear_unit")
 
 
-# Load sources of a gearbox file: files found, read and weighted by hours of the life, with the hash of each
-
 HOURS_PER_YEAR = 8766.0
 HUB_CELLS = 8
 """Number of cells of each rotor load into which torque bins are split."""
@@ -194,9 +192,7 @@ class LoadSource(ReprMixin):
     @property
     def hub_loads(self) -> Floats:
         """Rotor loads (samples, 5), with zeros if there are none."""
-        if self.hub.shape[1]:
-            return self.hub
-        return np.zeros((len(self.torque), HUB_LOADS))
+        return self.hub if self.hub.shape[1] else np.zeros((len(self.torque), HUB_LOADS))
 
 
 LEAST_SHARE_BACKWARDS = 0.05
@@ -523,7 +519,7 @@ class _SourceDraft:
             return group * pool.files
         if section.events_per_year is not None:
             return section.events_per_year * pool.seconds / 3600.0
-        return (section.hours_per_year or 0.0) * pool.seconds / sum(one.seconds for one in self.pools.values())
+        return (section.hours_per_year or 0.0) * pool.seconds / sum(pool.seconds for pool in self.pools.values())
 
     def _ranges(self, by_wind: Mapping[float, float]) -> dict[tuple[str, float], float]:
         """Return the equivalent ranges of all pools, weighted by their hours."""

@@ -270,16 +270,16 @@ def _mesh_loads(
 ) -> MeshLoads:
     """Return the loads of the meshes of a family, from the static balance."""
     points = acting.points
-    own = np.sign(points.torque) == sense
-    torque = points.torque[own]
-    hub = points.other[own]
+    same_sense = np.sign(points.torque) == sense
+    torque = points.torque[same_sense]
+    hub = points.other[same_sense]
     numbers = [number for number, mesh in enumerate(gearbox.meshes) if mesh.family == tooth.family]
     forces = np.abs(balance.at(balance.mesh_force, torque, hub)[..., numbers])
     plain = np.abs(balance.at(balance.mesh_force, torque)[..., numbers]).mean(axis=(1, 2))
     tilts = np.abs(balance.at(balance.misalignment, torque, hub)[..., numbers]).max(axis=(1, 2))
     pair = rules.pair
     gear = (pair.pinion, pair.gear)[tooth.member]
-    speed = points.speed[own] * tooth.cycles / len(tooth.meshes) * gear.teeth / pair.pinion.teeth
+    speed = points.speed[same_sense] * tooth.cycles / len(tooth.meshes) * gear.teeth / pair.pinion.teeth
     force = tangential_force(pair.pinion, 1.0) * plain
     carries = force > LEAST_FORCE
     return MeshLoads(
@@ -288,7 +288,7 @@ def _mesh_loads(
         sharing=forces.max(axis=(1, 2))[carries] / plain[carries],
         opening=tilts[carries] * pair.face_width,
         speed=speed[carries],
-        turns=(points.revolutions[own] * tooth.cycles)[carries],
+        turns=(points.revolutions[same_sense] * tooth.cycles)[carries],
     )
 
 
@@ -430,7 +430,7 @@ def nominal_loads(gearbox: Gearbox, rating: RatingSection, factor: float = 1.0) 
     if speed == 0.0 or torque == 0.0:
         raise gearbox.error(f"static_load.torques_N_m.{body} = {torque:g}: {body} transmits no power at rated speed")
     teeth = tooth_exposures(gearbox, body)
-    least = min((one.cycles for one in teeth if one.cycles > 0.0), default=1.0)
+    least = min((tooth.cycles for tooth in teeth if tooth.cycles > 0.0), default=1.0)
     torque *= factor
     hours = rating.nominal_hours or LONGEST / least * 2.0 * math.pi / speed / 3600.0
     duration = load_duration(np.array([torque]), np.array([speed]), np.array([hours]), 1)
@@ -455,7 +455,7 @@ def nominal_loads(gearbox: Gearbox, rating: RatingSection, factor: float = 1.0) 
 
 
 def _source(torque: float, speed: float, hours: float) -> LoadSource:
-    one = np.array([torque])
+    torques = np.array([torque])
     return LoadSource(
         name="nominal",
         kind="fatigue",
@@ -464,7 +464,7 @@ def _source(torque: float, speed: float, hours: float) -> LoadSource:
         files=0,
         count=1,
         digest=hashlib.sha256(f"{torque!r} {speed!r} {hours!r}".encode()).hexdigest(),
-        torque=one,
+        torque=torques,
         speed=np.array([speed]),
         hours=np.array([hours]),
         hub=np.zeros((1, 0)),

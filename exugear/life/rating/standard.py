@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.gearbox.sections.loads import StrengthSection
-from exugear.gearbox.units import MPA
+from exugear.gearbox.units import MPA, si
 from exugear.life.gear_life import hardening_of, life_curves, root_factors, root_strength, roughness_of
 from fe_ste.geometry.gears import GearPair
 from fe_ste.standards.iso1328 import tolerance
@@ -163,7 +163,7 @@ def rate(rules: FlankRules, loads: MeshLoads) -> dict[str, float]:
     strength = rules.strength
     if strength is not None:
         curve, bending = life_curves(strength)
-        endured = MPA * strength.sigma_H_lim_MPa * allowed.prod(axis=1)
+        endured = si(strength, "sigma_H_lim_MPa") * allowed.prod(axis=1)
         broken = root_strength(strength, rules.pair, rules.member)
         by_load = damages(curve, contact / endured, 1.0, loads.turns)
         if 0.0 < by_load.sum() < math.inf:
@@ -177,7 +177,7 @@ def rate(rules: FlankRules, loads: MeshLoads) -> dict[str, float]:
         if strength.root_factor is None:
             found |= dict(zip(ROOT_STRENGTH, relative, strict=True))
         found["Y_M"] = strength.mean_stress_factor or 1.0
-        found |= {"sigma_Hlim": MPA * strength.sigma_H_lim_MPa, "sigma_Flim": MPA * strength.sigma_F_lim_MPa}
+        found |= {"sigma_Hlim": si(strength, "sigma_H_lim_MPa"), "sigma_Flim": si(strength, "sigma_F_lim_MPa")}
     found |= dict(zip(("Z_L", "Z_v", "Z_R"), allowed[decides].tolist(), strict=True))
     gear = (rules.pair.pinion, rules.pair.gear)[rules.member]
     place = {
@@ -268,7 +268,7 @@ def _run_in(rules: FlankRules, deviations: FlankDeviations | None, velocity: flo
 def _mean(rules: FlankRules, taken: Callable[[Hardening, float], float]) -> float:
     """Return the mean running-in allowance of both gears; zero without their strength."""
     known = [strength for strength in rules.strengths if strength is not None]
-    values = [taken(hardening_of(one), MPA * one.sigma_H_lim_MPa) for one in known]
+    values = [taken(hardening_of(strength), si(strength, "sigma_H_lim_MPa")) for strength in known]
     if values:
         return sum(values) / len(values)
     return 0.0
@@ -317,8 +317,8 @@ def _contact_influences(rules: FlankRules, velocity: float) -> tuple[float, floa
     known = [strength for strength in rules.strengths if strength is not None]
     if not known:
         return math.nan, math.nan, math.nan
-    softer = MPA * min(one.sigma_H_lim_MPa for one in known)
-    roughness = sum(roughness_of(one) for one in known) / len(known)
+    softer = MPA * min(strength.sigma_H_lim_MPa for strength in known)
+    roughness = sum(roughness_of(strength) for strength in known) / len(known)
     return (
         lubricant_factor(softer, rules.viscosity),
         velocity_factor(softer, velocity),

@@ -83,7 +83,7 @@ def line_spectra(
     """
     fine = np.union1d(speed, np.linspace(float(speed[0]), float(speed[-1]), FRAMES))
     known = 20.0 * np.log10(np.maximum(amplitude / reference, 1e-10))
-    level = np.array([np.interp(fine, speed, own) for own in known.T]).reshape(-1, fine.size).T
+    level = np.array([np.interp(fine, speed, column) for column in known.T]).reshape(-1, fine.size).T
     for place in unknown:
         after = int(np.searchsorted(speed, abs(place)))
         low = speed[after - 1] if after else -np.inf

@@ -210,9 +210,6 @@ def match_eigenfrequencies(
     return tuple(matches)
 
 
-# Order cuts: amplitude and phase of one order of a run-up along its speed
-
-
 @dataclass(frozen=True)
 class OrderCut(ReprMixin):
     """Amplitude and phase along an order."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -111,8 +112,6 @@ def nearest_mode(modes: xr.Dataset, frequency: float, least_share: float = 0.0) 
         return None
     return report_mode(modes, int(allowed[np.argmin(np.abs(frequencies[allowed] - frequency))]))
 
-
-# Spectra of stored run-ups: their waterfall, and their resonances with the assigned eigenmodes
 
 LEAST_SHARE = 1e-5
 """Minimum participation of a mode that is assigned to a resonance of the overall transmission error."""
@@ -417,7 +416,7 @@ class Comparison(ReprMixin):
     def _lacking(self, run: VariantRun, other: VariantRun) -> tuple[Finding, ...]:
         # The highest peak decides for the whole resonance, because a weak order may be absent although the highest is
         # not.
-        absent = set(only_in_first((own.strongest for own in run.findings()), other.spectra, self.rule))
+        absent = set(only_in_first((finding.strongest for finding in run.findings()), other.spectra, self.rule))
         return tuple(finding for finding in run.findings() if finding.strongest in absent)
 
     @property
@@ -480,22 +479,17 @@ def other_windows(
         A run is missing or damaged.
     """
     signals = {run.variant: run_signals(run.path) for run in runs}
-    length = runs[0].spectra.window_length
-    return tuple(_with_window(signals, lines, factor * length, rule) for factor in factors)
-
-
-def _with_window(
-    signals: Mapping[str, RunSignals], lines: Sequence[OrderLine], length: float, rule: AbsenceRule | None
-) -> OtherWindow:
-    spectra = {variant: signal.waterfall(length) for variant, signal in signals.items()}
-    picks = {variant: pick_resonances(own, lines) for variant, own in spectra.items()}
-    absent = {
-        (variant, other): only_in_first(picks[variant], spectra[other], rule)
-        for variant in spectra
-        for other in spectra
-        if variant != other
-    }
-    return OtherWindow(picks, absent)
+    windows = []
+    for factor in factors:
+        length = factor * runs[0].spectra.window_length
+        spectra = {variant: signal.waterfall(length) for variant, signal in signals.items()}
+        picks = {variant: pick_resonances(spectrum, lines) for variant, spectrum in spectra.items()}
+        absent = {
+            (variant, other): only_in_first(picks[variant], spectra[other], rule)
+            for variant, other in itertools.permutations(spectra, 2)
+        }
+        windows.append(OtherWindow(picks, absent))
+    return tuple(windows)
 
 
 def is_among(pick: Pick, picks: Iterable[Pick]) -> bool:
@@ -509,8 +503,9 @@ def is_among(pick: Pick, picks: Iterable[Pick]) -> bool:
     (True, False)
     """
     return any(
-        own.line.name == pick.line.name and abs(own.frequency - pick.frequency) <= max(own.resolution, pick.resolution)
-        for own in picks
+        other.line.name == pick.line.name
+        and abs(other.frequency - pick.frequency) <= max(other.resolution, pick.resolution)
+        for other in picks
     )
 
 

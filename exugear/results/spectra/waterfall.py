@@ -130,9 +130,6 @@ def sweep_matched_window(sweep_rate: float) -> float:
     return 1.0 / math.sqrt(abs(sweep_rate))
 
 
-# Waterfalls: amplitude spectra of a run-up over the speed of the reference shaft
-
-
 @dataclass(frozen=True)
 class Waterfall(ReprMixin, line=": {time.size} spectra of {frequency.size} lines, {_spans}, {description}"):
     """Spectra over the speed of the reference shaft."""

@@ -25,8 +25,6 @@ from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError, solve_
 from fe_ste.tools.arrays import Complexes, Floats, Integers
 from fe_ste.tools.compilation import compiled
 
-# Branches of solutions over a parameter, through their folds: arc-length continuation
-
 Residual = Callable[[Complexes, float], tuple[Complexes, Any]]
 """Residual of lines at a parameter, and how it follows small changes of them: a map, or what `Solve` knows to solve."""
 Solve = Callable[[Any, Complexes, float], Complexes]
@@ -264,7 +262,7 @@ def _apply_kicks(state: Floats, advance: Floats, pushes: Floats, reads: Floats, 
     return moved
 
 
-# Peaks of complex curves over a parameter that is known at few places: where they stand, and how high they are
+# Peaks of complex curves known at few values of a parameter
 
 STANDS = 0.01
 """Prominence, as a share of a peak's height, above the lowest values on both sides up to the next higher peak."""
@@ -352,7 +350,7 @@ def predicted_top(
     found = [float(places[highest]), float(size(values)[highest])]
     # Where curves through other neighbours differ, the highest is to be looked at.
     for first in range(max(highest - 3, 0), min(highest, len(places) - NEIGHBOURS + 1)):
-        found = max(found, list(_top(places, values, highest, first, size)), key=lambda own: own[1])
+        found = max(found, list(_top(places, values, highest, first, size)), key=lambda peak: peak[1])
     return found[0], found[1]
 
 

@@ -20,8 +20,6 @@ from fe_ste.tools.bundles import cached_bundle
 from fe_ste.tools.compilation import kernel
 from fe_ste.tools.octets import SIZE, aligned_zeros, all_eight, eight, put
 
-# Linear equations of harmonic balance, solved without their matrix
-
 MOST_PRODUCTS = 400
 """Products with the operator after which the search is given up."""
 
@@ -118,8 +116,6 @@ def _steps(columns: list[list[float]], rest: list[float]) -> Floats:
         triangle[: n + 1, n] = column
     return np.asarray(np.linalg.solve(triangle, rest[: len(columns)]))
 
-
-# Many systems of equations of one pattern, solved eight at a time: lines of a response at one speed
 
 LEFT_OVER = 1e-10
 """Residual over the load up to which a solution counts as such, both by the sum of all loads."""

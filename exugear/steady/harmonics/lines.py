@@ -206,8 +206,8 @@ def modulated(lines: LineSet, modulators: Sequence[Modulator]) -> LineSet:
     >>> [tuple(row) for row in lines.index.tolist()]
     [(0, 0, 0), (1, 0, -1), (1, 0, 0), (1, 0, 1), (0, 1, 0)]
     """
-    own = np.array([modulator.order for modulator in modulators])
-    bases = np.append(lines.bases, own)
+    orders = np.array([modulator.order for modulator in modulators])
+    bases = np.append(lines.bases, orders)
     rows: set[tuple[int, ...]] = set()
     for line in lines.index[1:]:
         for turns in itertools.product(*(modulator.turns(line) for modulator in modulators)):
@@ -315,8 +315,6 @@ def _with_slow(units: Integers, slow: int) -> Integers:
     found[len(units) :, units.shape[1] :] = np.eye(slow, dtype=np.int64)
     return found
 
-
-# A rank-1 lattice on the torus of all bases' angles: few samples on which lines do not alias
 
 GROWTH = 1.15
 """Factor from one number of samples that is tried to the next."""
@@ -432,9 +430,6 @@ def _smooth(least: int) -> int:
         number += 2
 
 
-# Products of signals with functions of the bases' angles that couple them: each harmonic carries lines to others
-
-
 def fourier_coefficients(samples: Floats, harmonics: int) -> Complexes:
     """Coefficients c_0 .. c_h of a real function sum_h c_h e^(i h theta) from samples over a period.
 
@@ -500,8 +495,8 @@ class HarmonicCoupling:
             blocks = blocks + coefficients * len(group.harmonics)
         places, conjugates, at_blocks = (np.concatenate(own) for own in zip(*parts, strict=True))
         begin, size, room = (
-            np.array(own, dtype=np.int64)
-            for own in zip(*((own.begin, own.size, _filled(own.size)) for own in self.groups), strict=True)
+            np.array(group, dtype=np.int64)
+            for group in zip(*((group.begin, group.size, _filled(group.size)) for group in self.groups), strict=True)
         )
         return Terms(begin, size, room, np.array(first), places, conjugates, at_blocks)
 

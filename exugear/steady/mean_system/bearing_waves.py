@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from exugear.steady.mean_system.mean_system import PLACE_STEP, PLACES, RATE_STEP, MeanSystem
-from exugear.steady.mean_system.mesh_places import POSITION, MeshInterface, MeshPlaces, wave_shapes
+from exugear.steady.mean_system.mesh_places import POSITION, MeshInterface, MeshPlaces, among_waves, wave_shapes
 from exugear.steady.mean_system.mesh_waves import WAVES, MeshWaves, wave_name
 from exugear.steady.mean_system.rotating_frame import PlanetSet, SteadyError
 from exugear.steady.mean_system.sampled_laws import sample_rolling
@@ -98,9 +98,9 @@ class BearingWaves:
     @cached_property
     def laws(self) -> RollingArrays:
         """Law of each family, of planets along radius and tangent."""
-        own = [self.waves[n] for n in self.firsts]
-        laws = selected_rolling(self.assembly.connectors.rolling, np.array([wave.connectors[0] for wave in own]))
-        turned = np.array([0.0 if wave.planets is None else wave.planets.angles[0] for wave in own])
+        firsts = [self.waves[n] for n in self.firsts]
+        laws = selected_rolling(self.assembly.connectors.rolling, np.array([wave.connectors[0] for wave in firsts]))
+        turned = np.array([0.0 if wave.planets is None else wave.planets.angles[0] for wave in firsts])
         return laws._replace(phase=laws.phase - turned)
 
     @cached_property
@@ -177,7 +177,7 @@ class BearingWaves:
     def _static_loads(self, static: Floats) -> Floats:
         """Find the forces (c, 5) at readings (c, 5) of the bearings."""
         laws = [self.waves[n].law for n in self.firsts for _ in self.waves[n].connectors]
-        found = [sample_rolling(self.laws, law, own[None])[0] for law, own in zip(laws, static, strict=True)]
+        found = [sample_rolling(self.laws, law, strain[None])[0] for law, strain in zip(laws, static, strict=True)]
         return np.concatenate(found)
 
     def _mean_slope(self, static: Floats) -> Floats:
@@ -224,7 +224,7 @@ def bearing_waves(meshes: MeshWaves) -> BearingWaves | None:
     waves: list[BearingWave] = []
     for law, (family, numbers) in enumerate(families.items()):
         bodies = [assembly.supports[n].body for n in numbers]
-        planets = next((own for own in meshes.system.frame.sets if bodies[0] in own.names), None)
+        planets = next((planets for planets in meshes.system.frame.sets if bodies[0] in planets.names), None)
         if planets is None:
             waves.append(BearingWave(family, tuple(numbers), law, 0, 1.0, None))
             continue
@@ -281,14 +281,9 @@ def places_with_bearings(
         turning = planets is not None and planets.carrier in bearings.carriers
         column = meshes + bearings.carriers.index(planets.carrier) if planets and turning else None
         shapes = wave_shapes(planets, speed, None if column is None else angles[:, column])
-        own = slice(count + n, count + n + shapes.shape[-1])
-        rows = np.zeros((*shapes.shape[:-1], total))
-        columns = np.zeros((*shapes.shape[:-2], total, shapes.shape[-2]))
-        rows[..., own] = shapes
-        columns[..., own, :] = np.swapaxes(shapes / (shapes**2).sum(axis=-2, keepdims=True), -1, -2)
-        samples = places.there.shape[:-2]
-        there.append(np.broadcast_to(rows, (*samples, *rows.shape[-2:])))
-        back.append(np.broadcast_to(columns, (*samples, *columns.shape[-2:])))
+        rows, columns = among_waves(shapes, count + n, total, places.there.shape[:-2])
+        there.append(rows)
+        back.append(columns)
         means += [count + n] * shapes.shape[-2]
     return MeshPlaces(
         tuple(means),

@@ -23,6 +23,7 @@ from exugear.gearbox.parts import Mesh
 from exugear.steady.harmonics.linear_solvers import Elimination, elimination, solve_side_by_side
 from exugear.steady.mean_system.rotating_frame import PlanetSet, RotatingFrame, SteadyError, planet_sets
 from exugear.system.bearings.stiffness import load_stands_still, planet_supports, with_equal_planets
+from exugear.system.modes import state_matrix
 from exugear.system.statics import RIGID_BODY_LIMIT, BalanceError, static_state
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Complexes, Floats
@@ -163,9 +164,8 @@ class MeanSystem(ReprMixin):
 
     def eigenvalues(self, speed: float) -> Complexes:
         """Eigenvalues of the averaged system at a speed of the input, 1/s; free rotation among them."""
-        n = self.size
-        lower = np.linalg.solve(self.mass, np.hstack([-self.stiffness_at(speed), -self.damping_at(speed)]))
-        return np.asarray(scipy.linalg.eigvals(np.vstack([np.eye(n, 2 * n, n), lower])))
+        matrix = state_matrix(self.mass, self.damping_at(speed), self.stiffness_at(speed))
+        return np.asarray(scipy.linalg.eigvals(matrix))
 
 
 def mean_system(assembly: Assembly, speeds: Floats) -> MeanSystem:
@@ -272,13 +272,9 @@ def _check(assembly: Assembly) -> None:
             "pins: position errors cause unequal planet loads that rotate with the carrier, which the steady-state "
             "response cannot treat; remove them, or use `exugear run`"
         )
-    _check_rows(assembly)
-
-
-def _check_rows(assembly: Assembly) -> None:
-    """Refuse rows of rolling elements that pass, or that turn against the load that they carry."""
+    # Rows of rolling elements must neither pass nor turn against the load that they carry.
     rolling = assembly.connectors.rolling
-    bodies = {body.name: body for body in assembly.gearbox.bodies()}
+    bodies = {body.name: body for body in gearbox.bodies()}
     for n in np.flatnonzero(np.diff(rolling.first)):
         support = assembly.supports[n]
         if rolling.cage_ratio[n]:
@@ -340,9 +336,7 @@ def _stiffness(frame: RotatingFrame, psi: float, speed: float, u: Floats) -> Flo
 
 def place_step(assembly: Assembly) -> float:
     """Step of central differences of forces by places, m and rad."""
-    if assembly.has_rows:
-        return ROWS_STEP
-    return PLACE_STEP
+    return ROWS_STEP if assembly.has_rows else PLACE_STEP
 
 
 def _mass(frame: RotatingFrame, psi: float, u: Floats) -> Floats:
@@ -351,7 +345,7 @@ def _mass(frame: RotatingFrame, psi: float, u: Floats) -> Floats:
     t = frame.matrices(psi)[0]
     q, v, a = frame.state(psi, 0.0, u)
     still = assembly.inertia_forces(q, v, a)
-    columns = [assembly.inertia_forces(q, v, a + own) - still for own in t.T]
+    columns = [assembly.inertia_forces(q, v, a + unit) - still for unit in t.T]
     return np.asarray(t.T @ np.array(columns).T)
 
 
@@ -359,7 +353,7 @@ def _residuals(frame: RotatingFrame, psi: float, speed: float, u: Floats, du: Fl
     """Return `_residual` at several coordinates and velocities (n, size) at once: bearings have much in common."""
     assembly = frame.assembly
     t = frame.matrices(psi)[0]
-    states = [frame.state(psi, speed, own, None if du is None else du[n]) for n, own in enumerate(u)]
+    states = [frame.state(psi, speed, place, None if du is None else du[n]) for n, place in enumerate(u)]
     q, v, _ = (np.array(values) for values in zip(*states, strict=True))
     needed = np.array([assembly.inertia_forces(*state) for state in states])
     return np.asarray((needed - assembly.forces(q, v, frame.mean_meshes)) @ t)
@@ -416,15 +410,15 @@ def _mean_over_places(
         The stiffness changes as the carrier turns.
     """
     period = max(2.0 * math.pi / abs(planets.waves * planets.ratio) for planets in frame.sets)
-    more = tuple(np.zeros_like(own) for own in here)
+    more = tuple(np.zeros_like(value) for value in here)
     largest = 0.0
     curved = any(element.is_curved for element in frame.assembly.elements)
     most = ROWS_VARIATION if frame.assembly.has_rows or curved else VARIATION
     for psi in period * np.arange(1, PLACES) / PLACES:
         there = (_mass(frame, float(psi), u), *tangents(frame, float(psi), speed, u))
         largest = max(largest, _checked_change(here[2], there[2], most))
-        for mean, one, other in zip(more, here, there, strict=True):
-            mean += (other - one) / PLACES
+        for mean, value, other in zip(more, here, there, strict=True):
+            mean += (other - value) / PLACES
     return more, largest
 
 
@@ -464,9 +458,7 @@ def vibrations(mass: Floats, damping: Floats, stiffness: Floats) -> tuple[Comple
     >>> values.imag.round(6)
     array([10., 20.])
     """
-    n = len(mass)
-    lower = np.linalg.solve(mass, np.hstack([-stiffness, -damping]))
-    found: Any = scipy.linalg.eig(np.vstack([np.eye(n, 2 * n, n), lower]), left=True, right=True)
+    found: Any = scipy.linalg.eig(state_matrix(mass, damping, stiffness), left=True, right=True)
     values, left, right = found
     kept = values.imag > 2.0 * np.pi * RIGID_BODY_LIMIT
     kept &= np.abs(values.imag) > np.abs(values.real)

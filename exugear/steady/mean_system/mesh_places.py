@@ -71,18 +71,13 @@ def mesh_places(waves: MeshWaves, speed: float, positions: Floats, angles: Float
         if wave.wave != 0:
             continue
         planets = waves.planets(wave)
-        own = slice(first, first + sum(other.first == wave.first for other in waves.waves))
         sense = math.copysign(1.0, speed) * wave.sense
         position = positions[first] + sense * angles[:, [wave.base]] / (2.0 * math.pi)
         column = len(waves.base_orders) + carriers.index(planets.carrier) if planets and wave.ahead else None
         shapes = wave_shapes(planets, speed, None if column is None else angles[:, column])
-        rows = np.zeros((*shapes.shape[:-1], count))
-        columns = np.zeros((*shapes.shape[:-2], count, shapes.shape[-2]))
-        rows[..., own] = shapes
-        columns[..., own, :] = np.swapaxes(shapes / (shapes**2).sum(axis=-2, keepdims=True), -1, -2)
-        samples = (len(angles),) if turning else ()
-        there.append(np.broadcast_to(rows, (*samples, *rows.shape[-2:])))
-        back.append(np.broadcast_to(columns, (*samples, *columns.shape[-2:])))
+        rows, columns = among_waves(shapes, first, count, (len(angles),) if turning else ())
+        there.append(rows)
+        back.append(columns)
         means += [first] * shapes.shape[-2]
         at.append(position + np.array(wave.ahead or np.zeros(shapes.shape[-2])))
     return MeshPlaces(
@@ -107,7 +102,23 @@ def wave_shapes(planets: PlanetSet | None, speed: float, turned: Floats | None) 
     return np.stack([np.ones_like(theta), np.cos(theta), np.sin(theta)], axis=1)
 
 
-# What mesh laws read of the motion and what they push along: rows by the frame's coordinates, as waves
+def among_waves(shapes: Floats, first: int, count: int, samples: tuple[int, ...]) -> tuple[Floats, Floats]:
+    """Values in places p by those of all `count` waves (..., p, count), and back, for some waves from `first` on.
+
+    Parameters
+    ----------
+    shapes : (..., p, waves) of these waves in the places
+    samples : shape of the samples over which the shapes turn; empty if they are constant
+    """
+    waves = slice(first, first + shapes.shape[-1])
+    rows = np.zeros((*shapes.shape[:-1], count))
+    columns = np.zeros((*shapes.shape[:-2], count, shapes.shape[-2]))
+    rows[..., waves] = shapes
+    columns[..., waves, :] = np.swapaxes(shapes / (shapes**2).sum(axis=-2, keepdims=True), -1, -2)
+    return np.broadcast_to(rows, (*samples, *rows.shape[-2:])), np.broadcast_to(
+        columns, (*samples, *columns.shape[-2:])
+    )
+
 
 DEFLECTION, MISALIGNMENT, POSITION = 0, 1, -1
 """Indices of the inputs of a model along a row: the first, the second where its load shuttles, the last."""
@@ -186,8 +197,6 @@ def _table_rows(meshes: MeshArrays) -> tuple[list[Floats], list[Floats]]:
     return rows, [front, -front - table.backlash, nominal[NOMINAL_DISTANCE], tilt, tilt]
 
 
-# How functions of the mesh cycle couple the waves of meshes: one matrix for each harmonic of the angles that turn
-
 SAMPLED = 4
 """Samples of a carrier's turn over the highest multiple of it that shapes have with each other."""
 Spectra = Mapping[tuple[int, int], Complexes]
@@ -255,7 +264,7 @@ def coupled(
     mean wave to cosine and sine.
     """
     forward = waves.waves[family.first].sense * math.copysign(1.0, speed) > 0.0
-    cycles = np.array([own[family.first] for own in spectra.values()])
+    cycles = np.array([values[family.first] for values in spectra.values()])
     parts = (_place_coefficients if waves.carriers else _wave_coefficients)(family, cycles, ports, speed)
     if not forward:  # the mesh runs through its cycle backwards, the carrier turns as it does
         parts = parts[:, :, ::-1].conj()

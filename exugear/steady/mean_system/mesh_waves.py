@@ -204,9 +204,9 @@ class MeshWaves:
     def positions(self, speed: float) -> Floats:
         """Position in the mesh cycle of each wave's mesh at zero angle of the input, (m,), cycles."""
         moved = self.position_rows() @ self.system.static_at(speed)
-        own = np.array([self.assembly.meshes.phase[wave.first] for wave in self.waves])
+        phases = np.array([self.assembly.meshes.phase[wave.first] for wave in self.waves])
         mean = {wave.family: float(moved[n]) for n, wave in enumerate(self.waves) if wave.wave == 0}
-        return np.asarray(own + np.array([mean[wave.family] for wave in self.waves]))
+        return np.asarray(phases + np.array([mean[wave.family] for wave in self.waves]))
 
     @property
     def shuttles(self) -> bool:
@@ -365,9 +365,7 @@ def _phases_ahead(assembly: Assembly, meshes: tuple[int, ...]) -> tuple[float, .
     """Cycles by which each mesh is ahead of the first, empty where all are in phase."""
     phases = assembly.meshes.phase[list(meshes)]
     apart = (phases - phases[0] + 0.5) % 1.0 - 0.5
-    if np.abs(apart).max() > IN_PHASE:
-        return tuple(float(own) for own in apart)
-    return ()
+    return tuple(float(phase) for phase in apart) if np.abs(apart).max() > IN_PHASE else ()
 
 
 def _turns_per_cycle(wave: MeshWave, planets: PlanetSet) -> int | None:
@@ -386,9 +384,7 @@ def _turns_per_cycle(wave: MeshWave, planets: PlanetSet) -> int | None:
 
 def _one_of(steps: set[int | None]) -> tuple[int | None]:
     """Return the common step of all meshes of a carrier, None where they differ."""
-    if len(steps) == 1:
-        return (next(iter(steps)),)
-    return (None,)
+    return (next(iter(steps)),) if len(steps) == 1 else (None,)
 
 
 def _row(assembly: Assembly, mesh: int, q: Floats, row: Floats) -> tuple[float, Floats]:

@@ -178,8 +178,6 @@ def _support_waves(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> tuple[Flo
     return turn, labels
 
 
-# The quantities that describe a steady-state response: transmission error, bearing force, accelerations
-
 MEAN_OF_OTHERS = 0.5
 """Mean square over the planets of each multi-blade component, except for the common one."""
 ALTERNATING = "alternating"

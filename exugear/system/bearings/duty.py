@@ -43,8 +43,6 @@ from exugear.system.bearings.stiffness import LEAST_LOAD, holding_force, holds_o
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin
 
-# The state that a bearing works in: what it carries, how its rings stand, and how stiff its rows are there
-
 CAGE_POSITIONS = 4
 """Positions of the cage within one pitch over which the stiffness is averaged: a linear bearing knows no cage."""
 
@@ -138,8 +136,6 @@ def operating_point(
     )
 
 
-# What bearings bear: load, stiffness, misalignment, contact pressure and life of each at its operating point
-
 INSIDE = ("element_diameter_mm", "element_count", "element_length_mm")
 """Estimates that ratings rest on."""
 STATED_FACTOR = 3.0
@@ -224,7 +220,9 @@ def ratings_of(section: CatalogueSection) -> LoadRatings:
     elif any(estimate.key in INSIDE for estimate in estimates(section)):
         dynamic_margin, static_margin = margins(section)
         computed = computed[0] / dynamic_margin, computed[1] / static_margin
-    dynamic, static = (own if stated is None else KN * stated for own, stated in zip(computed, given, strict=True))
+    dynamic, static = (
+        rating if stated is None else KN * stated for rating, stated in zip(computed, given, strict=True)
+    )
     if None not in given:
         return LoadRatings(dynamic, static, estimated=False)
     if known is None:

@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Bearing, Body, connector_matrix
 from exugear.gearbox.sections.connections import CatalogueSection
-from exugear.gearbox.units import KN
+from exugear.gearbox.units import optional_si, si
 from exugear.gearbox.variant import Variant
 from exugear.system.bearings.rolling.catalogue import catalogue_rows
 from exugear.system.bearings.rolling.contact import pitch_averaged_tangent
@@ -119,8 +119,6 @@ def proportional_damping(stiffness: Floats, time_constant: float) -> Floats:
         raise BearingError(f"damping: time_constant = {time_constant} s must not be negative")
     return time_constant * stiffness
 
-
-# Laws of supports: stiffness and damping as matrices, or rows of rolling elements with a law of their own
 
 NOMINAL_LOAD = 0.1
 """Load over the basic dynamic rating at which a bearing's stiffness is taken where its load is not known yet."""
@@ -326,7 +324,7 @@ def catalogue_stiffness(section: CatalogueSection) -> Floats:
     """
     rows = catalogue_rows(section)
     if section.radial_load_kN is not None:
-        force = (KN * section.radial_load_kN, 0.0, KN * (section.axial_load_kN or 0.0))
+        force = (si(section, "radial_load_kN"), 0.0, optional_si(section, "axial_load_kN") or 0.0)
     else:
         force = holding_force(rows, NOMINAL_LOAD * basic_dynamic_rating(rows, section.type))
     return axially_symmetric(pitch_averaged_tangent(BearingOfRows(rows), force))
@@ -347,7 +345,7 @@ def holding_force(rows: Sequence[RollingRow], radial: float, direction: float = 
     return radial * math.cos(direction), radial * math.sin(direction), axial
 
 
-# Planets made equal: bearings of a planet set get the mean of their laws, each seen along its own radius
+# Equal planets: bearings of a planet set get the mean of their laws, each seen along its own radius
 
 FEWEST = 3
 """Planets that a set needs: fewer do not average out what their turning does to the others."""
@@ -384,7 +382,12 @@ def planet_supports(supports: Sequence[Bearing], planets: Sequence[str], angles:
     """Families of supports that each planet (names) of a set has one of; angles (N,) of the planets, rad."""
     found = []
     for family in sorted({support.family for support in supports if support.body in planets}):
-        numbers = [n for name in planets for n, own in enumerate(supports) if own.body == name and own.family == family]
+        numbers = [
+            n
+            for name in planets
+            for n, support in enumerate(supports)
+            if support.body == name and support.family == family
+        ]
         if len(numbers) == len(planets):
             found.append(PlanetSupports(np.array(numbers, dtype=np.int64), angles))
     return found
@@ -404,17 +407,17 @@ def with_equal_planets(connectors: ConnectorArrays, sets: Iterable[PlanetSupport
     load = connectors.point_load.copy()
     with_rows = np.diff(connectors.rolling.first) > 0
     largest = 0.0
-    for own, angles in sets:
-        if with_rows[own].all() and not connectors.rolling.cage_ratio[own].any():
-            phase[own] = angles + _mean_angle(phase[own] - angles)
+    for members, angles in sets:
+        if with_rows[members].all() and not connectors.rolling.cage_ratio[members].any():
+            phase[members] = angles + _mean_angle(phase[members] - angles)
         turns = np.array([_turn(angle) for angle in angles])
         back = turns.transpose(0, 2, 1)
-        largest = max(largest, _spread(back @ stiffness[own] @ turns))
+        largest = max(largest, _spread(back @ stiffness[members] @ turns))
         for matrices in (stiffness, damping):
-            matrices[own] = turns @ (back @ matrices[own] @ turns).mean(axis=0) @ back
+            matrices[members] = turns @ (back @ matrices[members] @ turns).mean(axis=0) @ back
         for vectors in (strain, load):
-            mean = np.einsum("nij,nj->ni", back, vectors[own]).mean(axis=0)
-            vectors[own] = turns @ mean
+            mean = np.einsum("nij,nj->ni", back, vectors[members]).mean(axis=0)
+            vectors[members] = turns @ mean
     rolling = connectors.rolling._replace(phase=phase)
     equal = connectors._replace(
         stiffness=stiffness, damping=damping, point_strain=strain, point_load=load, rolling=rolling
@@ -445,7 +448,7 @@ def _turn(angle: float) -> Floats:
     return turn
 
 
-# What holds the bodies of a variant: which supports are at work
+# Active supports of a variant
 
 
 def unsupported(gearbox: Gearbox, variant: str) -> str:

@@ -18,8 +18,6 @@ from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.display import ReprMixin
 
-# An elastic body as modes in a frame that floats with it: what the reduction gives and Exudyn takes
-
 
 @dataclass(frozen=True)
 class FloatingBody(ReprMixin, line=" {name}: {seats!n} seats, {stiffness!n} modes, {mass:.4g} kg"):
@@ -77,9 +75,6 @@ class FloatingBody(ReprMixin, line=" {name}: {seats!n} seats, {stiffness!n} mode
         return self.mode_coordinates[: BODY_SIZE * len(self.seats)]
 
 
-# An elastic body as the equations of motion take it: reduced, with its seats and its rigid inertia. Data alone
-
-
 @dataclass(frozen=True)
 class ElasticBody(ReprMixin):
     """A reduced body of a gearbox."""
@@ -104,8 +99,6 @@ class ElasticBody(ReprMixin):
         frame = ", floating frame" if self.floating is not None else ""
         return f" of {self.reduced!r}: main seat {self.main_seat}{more}{frame}"
 
-
-# Rotations in space: Euler parameters, and tilts and spin of a seat
 
 IDENTITY = np.eye(3)
 """Rotation by nothing."""
@@ -146,8 +139,6 @@ def tilts_and_spin(turns: Floats, near: float) -> tuple[Floats, Floats]:
     rates[:, 2, 1], rates[:, 2, 2] = -sa / cb, ca / cb
     return np.stack([a, b, c], axis=1), rates
 
-
-# From a floating frame's coordinates to those of the reduced body, and back
 
 ORDER_TOLERANCE = 0.02
 """Largest distance of an eigenvalue of S from a whole number."""

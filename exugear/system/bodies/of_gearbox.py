@@ -25,7 +25,7 @@ from exugear.gearbox.sections.bodies import (
     SolidSection,
 )
 from exugear.gearbox.sections.gears import MaterialSection
-from exugear.gearbox.units import GPA, MM
+from exugear.gearbox.units import MM, optional_si, si
 from exugear.system.bearings.stiffness import elastic_names, mounts_at_work
 from exugear.system.bodies.elastic_body import ElasticBody, FloatingBody
 from exugear.system.bodies.reduction import Blank, Frame, ReducedBody, ReductionError, RigidInertia, with_rigid_inertia
@@ -52,12 +52,12 @@ from exugear.system.bodies.turned_section import Shaft, turned_hexahedra
 from exugear.system.bodies.turned_shaft import ShaftModel, load_or_reduce_shaft, reduce_shaft
 from fe_ste.geometry.gears import Material
 
-# Sections of the gearbox file as a reduction takes them: materials, blanks, frames, widths of seats
+# Input of a reduction from the gearbox file: materials, blanks, frames, widths of seats
 
 
 def material_of(section: MaterialSection) -> Material:
     """Material of a body, Pa and kg/m3."""
-    return Material(section.youngs_modulus_GPa * GPA, section.poissons_ratio, section.density_kg_per_m3)
+    return Material(si(section, "youngs_modulus_GPa"), section.poissons_ratio, section.density_kg_per_m3)
 
 
 def blank_of(section: BlankSection) -> Blank:
@@ -70,7 +70,7 @@ def seat_width(bearing: Bearing) -> float:
     if bearing.catalogue is None:
         return 0.0
     rows = 1 if bearing.catalogue.arrangement == "single" else 2
-    return rows * bearing.catalogue.width_mm * MM
+    return rows * si(bearing.catalogue, "width_mm")
 
 
 def frame_of(gearbox: Gearbox, body: Body) -> Frame:
@@ -126,7 +126,7 @@ def shaft_model(gearbox: Gearbox, name: str) -> ShaftModel:
         name=name,
         sections=sections,
         material=material_of(shape.material),
-        origin=(*body.axis, shape.start_z_mm * MM),
+        origin=(*body.axis, si(shape, "start_z_mm")),
         seats=tuple(seat for seat in seats if seat.name not in shared),
         blanks=blanks,
         band=gearbox.case.elasticity.band_Hz,
@@ -179,23 +179,22 @@ def _shape_of(gearbox: Gearbox, body: Body) -> ShapeSection:
 
 def _section_of(section: ShaftSectionSection) -> ShaftSection:
     """Piece of a shaft, m."""
-    outer_end = section.outer_diameter_end_mm
     inner = section.inner_diameter_mm
     inner_end = section.inner_diameter_end_mm
     if inner_end is not None:
         inner, inner_end = max(inner, POINT * inner_end), max(inner_end, POINT * inner)
     return ShaftSection(
-        MM * section.length_mm,
-        MM * section.outer_diameter_mm,
+        si(section, "length_mm"),
+        si(section, "outer_diameter_mm"),
         MM * inner,
-        None if outer_end is None else MM * outer_end,
+        optional_si(section, "outer_diameter_end_mm"),
         None if inner_end is None else MM * inner_end,
     )
 
 
 def _seats(gearbox: Gearbox, body: Body, shape: ShapeSection) -> Iterator[SeatBand]:
     """Each seat as given in the file, from the beginning of the shaft."""
-    start = shape.start_z_mm * MM
+    start = si(shape, "start_z_mm")
     for gear, z in body.wheels.items():
         yield SeatBand(gear, z - start, gearbox.gears[gear].face_width)
     for bearing in gearbox.bearings:
@@ -208,7 +207,7 @@ def _seats(gearbox: Gearbox, body: Body, shape: ShapeSection) -> Iterator[SeatBa
         if force.body == body.name:
             yield SeatBand(force.name, force.position[2] - start, 0.0)
     if shape.torque_z_mm is not None:
-        yield SeatBand(TORQUE_SEAT, shape.torque_z_mm * MM - start, 0.0)
+        yield SeatBand(TORQUE_SEAT, si(shape, "torque_z_mm") - start, 0.0)
 
 
 def solid_of_shaft(model: ShaftModel, size: MeshSize = SOLID_SIZE) -> SolidModel:
@@ -279,8 +278,8 @@ def solid_body(gearbox: Gearbox, name: str) -> SolidBody:
         )
     file = SolidFile(
         gearbox.file(f"{key}.file", solid.file, LARGEST_SOLID),
-        solid.length_unit_mm * MM,
-        (solid.element_size_mm or 0.0) * MM,
+        si(solid, "length_unit_mm"),
+        optional_si(solid, "element_size_mm") or 0.0,
         solid.elements_around,
         gearbox.permissions.scripts,
     )
@@ -390,9 +389,9 @@ def _solid_seat(gearbox: Gearbox, key: str, name: str, item: _Item | None, secti
     """One seat, from its entry in the file and the known data of the item on it."""
     diameter, width = (None, None) if item is None else (item.diameter, item.width)
     if section.diameter_mm is not None:
-        diameter = MM * section.diameter_mm
+        diameter = si(section, "diameter_mm")
     if section.width_mm is not None:
-        width = MM * section.width_mm
+        width = si(section, "width_mm")
     if section.inner_diameter_mm is not None:
         width = 0.0
     position = None if item is None else item.position
@@ -406,7 +405,7 @@ def _solid_seat(gearbox: Gearbox, key: str, name: str, item: _Item | None, secti
         raise gearbox.error(
             f"{key}: {what} {name!r} requires its position and size; set {' and '.join(missing)} in [{key}]"
         )
-    return SolidSeat(name, position, diameter / 2.0, width, 0.5 * MM * (section.inner_diameter_mm or 0.0))
+    return SolidSeat(name, position, diameter / 2.0, width, 0.5 * (optional_si(section, "inner_diameter_mm") or 0.0))
 
 
 def _parts(seat: SolidSeat, count: int) -> list[SolidSeat]:
@@ -460,9 +459,6 @@ def check_solids(gearbox: Gearbox, folder: Path) -> None:
         file: SolidFile = model.mesh
         if file.is_script and not file.scripts and not reduction_file(model, folder).is_file():
             raise gearbox.error(f"{key}.file = {file.path.name!r}: {UNPERMITTED}")
-
-
-# The elastic bodies of a gearbox: all that are elastic, reduced, with the rigid inertia of an inertia set
 
 
 def reduced_bodies(
@@ -537,8 +533,7 @@ def check_elastic_body(gearbox: Gearbox, name: str) -> None:
     if not model.seats:
         raise gearbox.error(f"bodies.{family}.shape: the body has no seat; add a gear, a bearing or torque_z_mm")
     try:
-        start = MM * _shape_of(gearbox, gearbox.body(name)).start_z_mm
-        check_shaft(model.sections, model.seats, start=start)
+        check_shaft(model.sections, model.seats, start=si(_shape_of(gearbox, gearbox.body(name)), "start_z_mm"))
     except ShaftError as error:
         raise gearbox.error(f"bodies.{family}.shape: {error}") from None
 
@@ -578,12 +573,8 @@ class _Hashed:
 def _reduced(hashed: _Hashed, folder: Path | None) -> ReducedBody:
     model = hashed.model
     if isinstance(model, SolidModel):
-        if folder is None:
-            return reduce_solid(model)
-        return load_or_reduce_solid(model, folder)
-    if folder is None:
-        return reduce_shaft(model)
-    return load_or_reduce_shaft(model, folder)
+        return reduce_solid(model) if folder is None else load_or_reduce_solid(model, folder)
+    return reduce_shaft(model) if folder is None else load_or_reduce_shaft(model, folder)
 
 
 @lru_cache(maxsize=16)

@@ -43,8 +43,6 @@ from fe_ste.tools.stores import Store
 if TYPE_CHECKING:
     from fe_ste.elimination import Backend, Factorisation
 
-# An elastic body reduced to seats and modal coordinates: what every way of reducing gives
-
 Frame = Literal["nonrotating", "carrier", "ground"]
 """Where coordinates are seen from: a frame that does not turn, the carrier's own, or the ground."""
 UX, UY, UZ, TILT_X, TILT_Y = 0, 1, AXIAL, TILT, TILT + 1
@@ -210,8 +208,6 @@ class RigidInertia:
     transverse: float
     axial: float
 
-
-# Reduction of elastic bodies: six coordinates at each seat, and a few modal coordinates inside
 
 MOST_LANCZOS_STEPS = 150
 """Lanczos steps after which the search for normal modes is given up."""

@@ -133,12 +133,12 @@ def locate(sections: Sequence[ShaftSection], seat: SeatBand, start: float = 0.0)
         for number, (start, end) in enumerate(itertools.pairwise(places))
         if (start < high - SAME and end > low + SAME) or (seat.width == 0.0 and start - SAME <= low <= end + SAME)
     ]
-    ends = {diameter for one in under for diameter in (sections[one].outer_diameter, sections[one].outer_end)}
+    ends = {diameter for number in under for diameter in (sections[number].outer_diameter, sections[number].outer_end)}
     if seat.width > 0.0 and len(under) > 1 and len(ends) > 1:
         raise ShaftError(
             f"seat {seat.name}: a shoulder lies between z = {limits[0]} and {limits[1]} mm; move or narrow it"
         )
-    return max(under, key=lambda one: sections[one].outer_at(seat.z - float(places[one]))), low, high
+    return max(under, key=lambda number: sections[number].outer_at(seat.z - float(places[number]))), low, high
 
 
 def narrowed(sections: Sequence[ShaftSection], seat: SeatBand) -> SeatBand:

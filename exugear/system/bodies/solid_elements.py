@@ -27,8 +27,6 @@ else:
     skfem = lazy_import("skfem")
 
 
-# Mass and stiffness of meshed solids
-
 ELEMENTS_AT_A_TIME = 1000
 """Elements whose matrices are held together."""
 
@@ -151,8 +149,6 @@ def shape_gradients(
     x, y = np.einsum("eka,kq->aeq", places[:, :, :2], values[:, 0], optimize=True)
     return x, y, slopes, np.abs(np.linalg.det(jacobian)) * weights
 
-
-# Solid meshes of second order: nodes in the middle of edges and faces, put where the elements want them
 
 TET_EDGES = np.array([[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])
 HEX_EDGES = np.array([[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]])

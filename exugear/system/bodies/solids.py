@@ -125,9 +125,7 @@ class SolidModel:
     @property
     def elements(self) -> Any:
         """The mesh itself, read from its file if necessary."""
-        if isinstance(self.mesh, SolidFile):
-            return self.mesh.mesh
-        return self.mesh
+        return self.mesh.mesh if isinstance(self.mesh, SolidFile) else self.mesh
 
 
 @dataclass(frozen=True)
@@ -317,9 +315,6 @@ def _surface(model: SolidModel, reduced: ReducedSolid) -> BodySurface:
         strain=np.stack(strain, axis=1).astype(np.float32),
         elasticity=elasticity,
     )
-
-
-# Flexible bodies in a floating frame: normal modes, and integrals over their mass
 
 
 def floating_body(model: SolidModel, matrices: ReducedSolid | None = None) -> FloatingBody:

@@ -50,9 +50,6 @@ else:
     skfem = lazy_import("skfem")
 
 
-# Cones of turned shafts: the map from a shaft of cylinders, whose lines are straight, to the radii that it has
-
-
 @dataclass(frozen=True)
 class _Stretch:
     """Radii of the shaft over those of its cylinders at one place: straight between knots, shifted beyond the last."""
@@ -133,8 +130,6 @@ def _stretched(last: _Stretch, section: ShaftSection, begins: Floats, cylinders:
     stretch = _Stretch(np.concatenate([[0.0], begins[bored:]]), np.concatenate([[0.0], ends[bored:]]))
     return _Stretch(knots, stretch.radius(last.radius(knots)))
 
-
-# Elasticity of shafts turned on a lathe: finite elements over the half-section, Fourier harmonics around it
 
 HarmonicName = Literal["bending", "torsion", "stretching"]
 FIELDS: dict[HarmonicName, int] = {"bending": 3, "torsion": 1, "stretching": 2}
@@ -497,8 +492,6 @@ def _half_section(radii: Floats, heights: Floats, solid: Any) -> Any:
     points = np.stack([radii[used // count], heights[used % count]])
     return skfem.MeshQuad(points, numbers.reshape(corners.shape))
 
-
-# Meshes of turned shafts as solids: second-order hexahedra on the lines of the half-section
 
 CORE = 0.5
 """Radius of the square core of a solid section over that of its first ring of lines."""

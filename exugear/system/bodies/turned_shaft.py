@@ -73,7 +73,7 @@ class ShaftModel:
 
 def _without_ends_of_cylinders(items: list[tuple[str, Any]]) -> dict[str, Any]:
     """Return inputs as they were before there were cones, so that what is stored of cylinders keeps its hash."""
-    return {key: one for key, one in items if one is not None or not key.endswith("_diameter_end")}
+    return {key: value for key, value in items if value is not None or not key.endswith("_diameter_end")}
 
 
 def reduce_shaft(model: ShaftModel) -> ReducedBody:

@@ -36,8 +36,6 @@ from exugear.system.system import Assembly
 from exugear.transient.exudyn_model.library import elements, exudyn, items
 from fe_ste.tools.arrays import Floats
 
-# Exudyn's object of a floating frame of reference, made from the integrals of a body's modes
-
 Rotation = Literal["euler_parameters", "tait_bryan"]
 
 
@@ -337,7 +335,9 @@ class Parts:
             number = self.bodies[body]
             local = position - node_position(carrying)
         else:
-            number = self._ground_object()
+            if self._ground is None:
+                self._ground = self.mbs.AddObject(items.ObjectGround())
+            number = self._ground
             local = position
         return self.mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=number, localPosition=np.asarray(local).tolist()))
 
@@ -349,11 +349,6 @@ class Parts:
         coordinates = exudyn.OutputVariableType.Coordinates
         return lambda: float(self.mbs.GetNodeOutput(node, coordinates)[SPIN_COORDINATE])
 
-    def _ground_object(self) -> Any:
-        if self._ground is None:
-            self._ground = self.mbs.AddObject(items.ObjectGround())
-        return self._ground
-
     def spin_marker(self, body: str, seat: str | None = None) -> Any:
         """Marker of a body's spin, of an elastic one at a seat or where torques act."""
         key = seat_key(body, seat or "")
@@ -361,9 +356,6 @@ class Parts:
         node = self.nodes[key if key in self.nodes else body]
         coordinate = SPIN_COORDINATE if has_six else 0
         return self.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=coordinate))
-
-
-# Bodies of an assembly in an Exudyn system: rigid ones, those with their spin alone, and elastic ones
 
 
 def add_bodies(parts: Parts, q: Floats, v: Floats) -> None:

@@ -17,15 +17,13 @@ from exugear.system.kernels.coordinates import BODY_SIZE, SPIN, SpringArrays
 from exugear.system.kernels.meshes import ROW_SIZE, MeshArrays
 from exugear.system.kernels.modal_damping import add_modal_damping, modal_matrix, modal_memory
 from exugear.system.kernels.rolling import CAGE_TORQUE, ELASTIC_PART, rolling_force, rolling_memory
-from exugear.system.loads import Drive, Loading
+from exugear.system.loads import LoadTable
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.mesh_forces import add_mesh_forces
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from exugear.transient.exudyn_model.bodies import Parts
 from exugear.transient.exudyn_model.library import exudyn, items
 from fe_ste.tools.arrays import Floats
-
-# What joins bodies in an Exudyn system: bearings and mounts, torsional couplings, ideal joints
 
 FREE_SPIN = [1, 1, 1, 1, 1, 0]
 """Axes that an ideal joint holds: all but the spin."""
@@ -124,54 +122,40 @@ def add_joint(parts: Parts, joint: Joint) -> None:
     )
 
 
-# What acts on a gearbox from outside in an Exudyn system: torques, and the drive at prescribed speed
+# External loads: torques, and the drive at prescribed speed
 
 
-def add_loading(parts: Parts, loading: Loading) -> None:
+def add_loads(parts: Parts, loads: LoadTable) -> None:
     """Add torques and drive; those on bodies in floating frames act with the other forces on these."""
     elsewhere = parts.assembly.floating
-    for name, torque in loading.constant.items():
+    for name, torque in loads.constant.items():
         if name not in elsewhere:
             parts.mbs.AddLoad(items.LoadCoordinate(markerNumber=parts.spin_marker(name), load=torque))
-    for name, series in loading.varying.items():
+    for name in loads.series:
         if name not in elsewhere:
             parts.mbs.AddLoad(
                 items.LoadCoordinate(
                     markerNumber=parts.spin_marker(name),
-                    load=series(0.0),
-                    loadUserFunction=_load_function(series),
+                    load=loads.torque(name, 0.0),
+                    loadUserFunction=_load_function(loads, name),
                 )
             )
-    if loading.drive is not None and loading.drive.body not in elsewhere:
-        _add_drive(parts, loading.drive)
-
-
-def _add_drive(parts: Parts, drive: Drive) -> None:
-    """Add the spring between a body's spin and the angle that it is driven by."""
-    fixed = parts.mbs.AddNode(items.NodePointGround())
-    ground = parts.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=fixed, coordinate=0))
-    parts.mbs.AddObject(
-        items.CoordinateSpringDamper(
-            markerNumbers=[ground, parts.spin_marker(drive.body)],
-            stiffness=drive.stiffness,
-            damping=drive.damping,
-            springForceUserFunction=_drive_function(drive),
+    drive = loads.drive
+    if drive is not None and drive.body not in elsewhere:
+        fixed = parts.mbs.AddNode(items.NodePointGround())
+        ground = parts.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=fixed, coordinate=0))
+        parts.mbs.AddObject(
+            items.CoordinateSpringDamper(
+                markerNumbers=[ground, parts.spin_marker(drive.body)],
+                stiffness=drive.stiffness,
+                damping=drive.damping,
+                springForceUserFunction=lambda mbs, t, item, u, v, k, d, offset: -drive.torque(t, u, v),
+            )
         )
-    )
 
 
-def _load_function(torque: Callable[[float], float]) -> Callable[[Any, float, float], float]:
-    return lambda mbs, t, load: torque(t)
-
-
-def _drive_function(drive: Drive) -> Callable[..., float]:
-    def force(mbs: Any, t: float, item: int, u: float, v: float, k: float, d: float, offset: float) -> float:
-        return k * (u - drive.angle(t)) + d * (v - drive.speed(t))
-
-    return force
-
-
-# Gear meshes in an Exudyn system, by one element for all of them or by loads on each gear
+def _load_function(loads: LoadTable, body: str) -> Callable[[Any, float, float], float]:
+    return lambda mbs, t, load: loads.torque(body, t)
 
 
 def add_mesh_element(parts: Parts, meshes: MeshArrays) -> None:
@@ -276,11 +260,8 @@ class _MeshVectors:
         return values
 
 
-# The variant `rigid` in an Exudyn system: minimal coordinates, masses, couplings, meshes and loads in one object
-
-
 def add_minimal_system(
-    mbs: Any, assembly: Assembly, q: Floats, v: Floats, loading: Loading, meshes: MeshArrays | None
+    mbs: Any, assembly: Assembly, q: Floats, v: Floats, loads: LoadTable, meshes: MeshArrays | None
 ) -> None:
     """Add all spins as one ``ObjectGenericODE2``; meshes are left out if None.
 
@@ -296,13 +277,13 @@ def add_minimal_system(
         )
     )
     stiffness, damping = _spring_matrices(assembly.size, assembly.springs)
-    steady = loading.generalized(assembly, 0.0, q, v) if loading.is_constant else None
+    steady = loads.generalized(assembly, 0.0, q, v) if loads.is_constant else None
     memory = modal_memory(assembly.modal)
 
     def force(mbs: Any, t: float, item: int, y: Any, rate: Any) -> Floats:
         q = motions @ np.array(y)
         v = motions @ np.array(rate)
-        f = loading.generalized(assembly, t, q, v) if steady is None else steady.copy()
+        f = loads.generalized(assembly, t, q, v) if steady is None else steady.copy()
         if meshes is not None:
             f += assembly.mesh_forces(q, v, meshes)
         if assembly.modal is not None:
@@ -311,7 +292,7 @@ def add_minimal_system(
 
     # The drive's spring is in no jacobian, and gears that only roll have coordinates of their own.
     jacobian: Any = 0
-    if loading.drive is None and meshes is not None and LAWS[assembly.mesh_model].has_force:
+    if loads.drive is None and meshes is not None and LAWS[assembly.mesh_model].has_force:
         jacobian = mesh_jacobian(assembly, meshes)
     mbs.AddObject(
         items.ObjectGenericODE2(

@@ -15,19 +15,20 @@ stops a run silently.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
 
 from exugear.gearbox.variant import VariantError
 from exugear.system.kernels.meshes import MeshArrays
-from exugear.system.loads import Loading
+from exugear.system.loads import LoadTable
 from exugear.system.system import Assembly
 from exugear.transient.exudyn_model.bodies import Parts, add_bodies
 from exugear.transient.exudyn_model.forces import (
     add_couplings,
     add_joint,
-    add_loading,
+    add_loads,
     add_mesh_element,
     add_mesh_loads,
     add_minimal_system,
@@ -71,13 +72,13 @@ class ExudynSystem:
         assembly: Assembly,
         q: Floats,
         v: Floats,
-        loading: Loading,
+        loads: LoadTable,
         mesh_route: MeshRoute = "element",
         meshes: MeshArrays | None = None,
         with_meshes: bool = True,
     ) -> None:
         self.assembly = assembly
-        self.loading = loading
+        self.loads = loads
         self._container = exudyn.SystemContainer()
         self.mbs = self._container.AddSystem()
         self.parts = Parts(self.mbs, assembly)
@@ -89,7 +90,7 @@ class ExudynSystem:
         chosen = assembly.meshes if meshes is None else meshes
         at_work = chosen if with_meshes else None
         if self._minimal:
-            add_minimal_system(self.mbs, assembly, q, v, loading, at_work)
+            add_minimal_system(self.mbs, assembly, q, v, loads, at_work)
         else:
             self._add_parts(q, v, mesh_route, at_work)
         self.mbs.Assemble()
@@ -105,19 +106,16 @@ class ExudynSystem:
         add_couplings(parts)
         if parts.floating is None:
             add_modal_element(parts)
-        add_loading(parts, self.loading)
+        add_loads(parts, self.loads)
         if self.assembly.variant.is_constrained:
             for joint in self.assembly.gearbox.joints:
                 add_joint(parts, joint)
         if parts.floating is not None:
-            parts.floating.add_forces(self.mbs, parts.all_nodes, meshes, self._applied)
+            parts.floating.add_forces(self.mbs, parts.all_nodes, meshes, partial(self.loads.generalized, self.assembly))
         elif meshes is not None and mesh_route == "element":
             add_mesh_element(parts, meshes)
         elif meshes is not None:
             add_mesh_loads(parts, meshes)
-
-    def _applied(self, t: float, q: Floats, v: Floats) -> Floats:
-        return self.loading.generalized(self.assembly, t, q, v)
 
     def _coordinate_order(self) -> Integers:
         """Position in Exudyn's coordinate vector of each coordinate of the assembly."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from exugear.system.loads import Loading, LoadTable
+from exugear.system.loads import LoadTable
 from exugear.system.signals import signal_layout
 from exugear.system.statics import linearise
 from exugear.system.system import Assembly
@@ -41,7 +41,7 @@ def exudyn_states(
         rows.append(np.array([q, v]))
         return True
 
-    ExudynSystem(assembly, q, v, Loading(load)).run(0.0, steps, step, keep, assembly.variant != "jointed")
+    ExudynSystem(assembly, q, v, LoadTable(load)).run(0.0, steps, step, keep, assembly.variant != "jointed")
     states = np.array(rows)
     return states[:, 0], states[:, 1]
 
@@ -59,7 +59,7 @@ def relative_error(found: np.ndarray, expected: np.ndarray) -> float:
 
 def assert_matrices_of_exudyn_are_those_of(assembly: Assembly, q: np.ndarray, tolerance: float) -> None:
     """Mass, stiffness and damping matrix at standing coordinates, meshes left out."""
-    found = ExudynSystem(assembly, q, np.zeros(assembly.size), Loading(), with_meshes=False).linearised()
+    found = ExudynSystem(assembly, q, np.zeros(assembly.size), LoadTable(), with_meshes=False).linearised()
     linear = linearise(assembly, q)
     others = [name for name in linear.stiffness if name not in assembly.mesh_names]
     stiff, damping = (sum(elements[name] for name in others) for elements in (linear.stiffness, linear.damping))

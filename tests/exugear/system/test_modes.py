@@ -14,7 +14,7 @@ import xarray as xr
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.system.build import assemble
-from exugear.system.loads import Loading
+from exugear.system.loads import LoadTable
 from exugear.system.modes import FREE_ROTATION, eigenmodes, modes_of
 from exugear.system.statics import linearise, locked_equilibrium
 from exugear.transient.exudyn_model.system import ExudynSystem
@@ -188,7 +188,9 @@ def test_exudyn_finds_the_same_frequencies(grc: Gearbox, stiffness: dict) -> Non
     assembly = assemble(grc, Choice("bushing"), stiffness)
     load = grc.case.static_load
     q = locked_equilibrium(assembly, load.torques_N_m, load.locked, assembly.mean_meshes)
-    system = ExudynSystem(assembly, q, np.zeros(assembly.size), Loading(load.torques_N_m), meshes=assembly.mean_meshes)
+    system = ExudynSystem(
+        assembly, q, np.zeros(assembly.size), LoadTable(load.torques_N_m), meshes=assembly.mean_meshes
+    )
     mass, stiff, _ = system.linearised()
     values = scipy.linalg.eigvals(stiff, mass)
     exudyn = np.sort(np.sqrt(np.abs(values.real))) / (2 * math.pi)
@@ -312,8 +314,8 @@ def test_parametric_response_of_a_single_pair_equals_scipy() -> None:
         rows.append(assembly.mesh_states(q, v)[0])
         return True
 
-    loading = Loading({"one": 100.0, "two": 100.0})
-    ExudynSystem(assembly, start[:2], start[2:], loading).run(0.0, steps, step, keep)
+    loads = LoadTable({"one": 100.0, "two": 100.0})
+    ExudynSystem(assembly, start[:2], start[2:], loads).run(0.0, steps, step, keep)
     delta = np.array(rows)[:, 0]
     expected = radius * (exact[0] + exact[1])
     assert np.ptp(expected) > 0.5 * expected.mean()  # the response is large: the test sees something

@@ -22,7 +22,7 @@ from exugear.system.bearings.stiffness import (
     planet_supports,
 )
 from exugear.system.build import assemble
-from exugear.system.loads import Loading, LoadTable
+from exugear.system.loads import LoadTable
 from exugear.system.modes import modes_of
 from exugear.system.sensitivity import planet_bearings, scaled_bearings
 from exugear.system.statics import accelerating_start, locked_equilibrium, static_state
@@ -123,7 +123,7 @@ def test_a_run_from_rest_stays_at_rest(tmp_path, solver):
             kept.append(q.copy())
             return True
 
-        ExudynSystem(assembly, start.q, start.v, Loading(torques)).run(0.0, 200, 2e-6, keep)
+        ExudynSystem(assembly, start.q, start.v, LoadTable(torques)).run(0.0, 200, 2e-6, keep)
         states = np.array(kept)
     assert np.abs(states - start.q).max() < 1e-7 * np.abs(start.q).max()
 

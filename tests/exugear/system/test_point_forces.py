@@ -14,7 +14,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.life.static_balance import is_linear
 from exugear.system.kernels.connectors import add_connector_forces
-from exugear.system.loads import Loading, LoadTable
+from exugear.system.loads import LoadTable
 from exugear.system.modes import eigenmodes
 from exugear.system.statics import locked_equilibrium
 from exugear.system.system import Assembly
@@ -108,7 +108,7 @@ def test_the_compiled_solver_accelerates_by_the_force() -> None:
 def test_exudyn_accelerates_by_the_force_as_the_equations_do(variant: str) -> None:
     assembly = assembled(gearbox_of(elastic=variant == "flexible"), Choice(variant), STIFFNESS).unloaded
     rest = np.zeros(assembly.size)
-    system = ExudynSystem(assembly, rest, rest, Loading(), with_meshes=False)
+    system = ExudynSystem(assembly, rest, rest, LoadTable(), with_meshes=False)
     step = 1e-9
     end = trajectory(system, 1, step)[-1]
     first = assembly.coordinates["shaft_1.thrust" if variant == "flexible" else "shaft_1"][0]

@@ -44,8 +44,6 @@ from fe_ste.tools.files import FileError
 from fe_ste.transmission_error.contact_stress import face_load_factor, largest_contact_stress, load_along_face
 from fe_ste.transmission_error.table import MeshTable, TableError
 
-# Results in a folder that belong to a gearbox; files computed from other input are skipped and reported
-
 Result = TypeVar("Result")
 Member = TypeVar("Member")
 _UNFIT = (GearboxFileError, MeshError, VariantError, BearingError, BalanceError, FileError, KeyError, ValueError)
@@ -92,7 +90,7 @@ class ResultsForExport:
     def loaded(self) -> Assembly | None:
         """The most complete variant with bearings for which results were read."""
         assemblies = [assembly for assembly in self._assemblies.values() if assembly.variant.has_bearings]
-        return max(assemblies, key=lambda one: one.variant.is_elastic, default=None)
+        return max(assemblies, key=lambda choice: choice.variant.is_elastic, default=None)
 
     def _each(self, pattern: str, read: Callable[[Path], tuple[Choice, Result]]) -> Iterator[tuple[Choice, Result]]:
         """Read files one by one; those that do not belong to the gearbox are recorded in `left_out`."""
@@ -303,9 +301,7 @@ def _active(pair: GearPair, gear: Gear) -> tuple[float, float]:
         tangent = pair.base_tangent_length
         rolls = [roll + tangent if gear.internal else tangent - roll for roll in rolls]
     low, high = sorted(math.hypot(gear.base_radius, roll) for roll in rolls)
-    if gear.internal:
-        return (high, low)
-    return (low, high)
+    return (high, low) if gear.internal else (low, high)
 
 
 def put_static_forces(results: Results) -> None:
@@ -400,9 +396,9 @@ def put_displacements(results: Results, assembly: Assembly) -> None:
         nodes = nodes[:: results.sense(number)]
         heights, moved = zip(*nodes, strict=True)
         along = results.sense(number) * (np.array(heights) - results.origins.places[number])
-        own = np.array(moved) @ results.origins.axes[number].T
+        displacements = np.array(moved) @ results.origins.axes[number].T
         results.put(number, "node_positions", along, results.static_case)
-        for axis, column in zip("uvw", own.T, strict=True):
+        for axis, column in zip("uvw", displacements.T, strict=True):
             results.put(number, f"displacement_{axis}", column, results.static_case)
 
 
@@ -486,9 +482,6 @@ def put_runs(results: Results, runs: Mapping[Choice, xr.Dataset]) -> None:
                     results.put_named(stage, f"{OWN}{key}_{ending}", "N", float(value), case)
 
 
-# Export of results into the REXS file from which a gearbox was imported
-
-
 @dataclass(frozen=True)
 class Exported(ReprMixin, line=": {named} attributes of REXS, {own} of exugear"):
     """A REXS file with results."""
@@ -544,8 +537,8 @@ def with_results(gearbox: Gearbox, folder: Path, path: str | Path, rules: Rules 
     if stored.loaded is not None:
         put_displacements(results, stored.loaded)
     content = with_additions(path, results.additions)
-    own = sum(addition.name.startswith(OWN) for addition in results.additions)
-    return Exported(content, own, len(results.additions) - own, _replaced(results), tuple(stored.left_out))
+    custom = sum(addition.name.startswith(OWN) for addition in results.additions)
+    return Exported(content, custom, len(results.additions) - custom, _replaced(results), tuple(stored.left_out))
 
 
 def _static_load_case(gearbox: Gearbox, model: Model) -> int | None:

@@ -27,9 +27,7 @@ def name_in(key: str, version: Version) -> str:
     ('base_circle_diameter', 'base_diameter', 'custom_exugear_base_diameter')
     """
     known = [name for since, name in RESULTS[key].names.items() if since <= version]
-    if known:
-        return known[-1]
-    return OWN + key
+    return known[-1] if known else OWN + key
 
 
 def unit_in(unit: str, version: tuple[int, int]) -> str:
@@ -86,7 +84,7 @@ def origins_of(found: Found) -> Origins:
     places = found.places
     first = first_of_planets(model, places, found.bodies)
     gears = {
-        name: (number, *(other for other, own in first.items() if own == number))
+        name: (number, *(other for other, planet in first.items() if planet == number))
         for number, name in found.teeth.names.items()
     }
     held = {name: _bearings(found, block) for name, block in found.bearings.items() if block.number}
@@ -97,7 +95,7 @@ def origins_of(found: Found) -> Origins:
         )
         for body in found.bodies.members
     }
-    turning = [number for each in bodies.values() for numbers in each for number in numbers]
+    turning = [number for members in bodies.values() for numbers in members for number in numbers]
     placed = [
         model.components[number]
         for number in dict.fromkeys([*turning, *(number for numbers in held.values() for number in numbers)])

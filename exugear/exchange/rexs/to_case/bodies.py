@@ -56,7 +56,7 @@ class RigidGroups(ReprMixin):
     def __init__(self, members: Sequence[RigidGroup]) -> None:
         self.members = tuple(members)
         self._of_part = {part.number: body for body in members for part in body.parts}
-        self._of_other = {part.number: body for body in members for each in body.others for part in each}
+        self._of_other = {part.number: body for body in members for planet in body.others for part in planet}
 
     def _line(self) -> str:
         return f": {', '.join(body.name for body in self.members)}"
@@ -148,7 +148,7 @@ def find_bodies(model: Model, places: ComponentPositions, notes: Notes) -> Rigid
     working = _working(model, union)
     sets = _planet_sets(model, places, union, groups)
     planets = {root for _, members in sets for root, _ in members}
-    pins = {one.roles["shaft"] for one in model.relations_of("planet_pin") if "shaft" in one.roles}
+    pins = {relation.roles["shaft"] for relation in model.relations_of("planet_pin") if "shaft" in relation.roles}
     names = _names(
         {root: parts for root, parts in groups.items() if root in working - planets}, _carriers(model, union)
     )
@@ -317,9 +317,9 @@ def _carrier(
 ) -> RigidGroup:
     """Carrier of the planets of a stage, of which one has the shaft."""
     held = [
-        one.number
+        part.number
         for kind in ("planet_carrier_shaft", "planet_pin")
-        for one in model.related(kind, "planetary_stage", stage, "shaft")
+        for part in model.related(kind, "planetary_stage", stage, "shaft")
     ]
     carriers = (by_root.get(union.root(number)) for number in held if number in union)
     carrier = next((body for body in carriers if body is not None), None)
@@ -341,12 +341,12 @@ def _orbits(
         dy = y - axis[1]
         angle = round(math.degrees(math.atan2(dy, dx)) % 360.0, 9) % 360.0
         planet = _Planet(angle, math.hypot(dx, dy), root, shaft)
-        orbit = next((one for one in orbits if abs(one[0].radius - planet.radius) <= COAXIAL), None)
+        orbit = next((planets for planets in orbits if abs(planets[0].radius - planet.radius) <= COAXIAL), None)
         if orbit is None:
             orbits.append([planet])
         else:
             orbit.append(planet)
-    orbits.sort(key=lambda one: one[0].radius)
+    orbits.sort(key=lambda planets: planets[0].radius)
     return [sorted(orbit, key=lambda planet: planet.angle) for orbit in orbits]
 
 
@@ -363,9 +363,7 @@ def _order_by_mating_planets(
     for body in earlier:
         for number, parts in enumerate((body.parts, *body.others)):
             if first & {part.number for part in parts} and len(body.angles) == len(placed):
-                if number:
-                    return placed[-number:] + placed[:-number]
-                return placed
+                return placed[-number:] + placed[:-number] if number else placed
     return placed
 
 
@@ -386,6 +384,4 @@ def _names(groups: Mapping[int, list[Component]], carriers: set[int]) -> dict[in
 
 
 def _lettered(name: str, number: int, count: int) -> str:
-    if count == 1:
-        return name
-    return f"{name}_{chr(ord('a') + number % 26)}"
+    return name if count == 1 else f"{name}_{chr(ord('a') + number % 26)}"

@@ -71,8 +71,6 @@ from exugear.gearbox.reading import GearboxFileError
 from exugear.system.gearbox_checks import check_parts
 from fe_ste.tools.display import ReprMixin
 
-# Bodies of a REXS file as tables of the gearbox file: position, inertia, and the shape of shafts
-
 INERTIAS = "geometry"
 """Name of the inertia set."""
 
@@ -87,7 +85,7 @@ def sections_of_bodies(
         for shaft in body.parts_of_type("shaft"):
             with notes.errors.gathered():
                 pieces += sections_of(model, places, shaft, body, notes)
-        found[body.name] = sorted(pieces, key=lambda one: one.start)
+        found[body.name] = sorted(pieces, key=lambda cylinder: cylinder.start)
     return found
 
 
@@ -185,14 +183,14 @@ def _has_shape(model: Model, body: RigidGroup, sections: Sequence[Cylinder]) -> 
 
 def _shape(model: Model, body: RigidGroup, sections: Sequence[Cylinder]) -> Block:
     pieces = []
-    for one in sections:
-        piece = {"length_mm": one.length, "outer_diameter_mm": one.outers[0]}
-        if one.inners[0]:
-            piece["inner_diameter_mm"] = one.inners[0]
-        if one.outers[1] != one.outers[0]:
-            piece["outer_diameter_end_mm"] = one.outers[1]
-        if one.inners[1] != one.inners[0]:
-            piece["inner_diameter_end_mm"] = one.inners[1]
+    for cylinder in sections:
+        piece = {"length_mm": cylinder.length, "outer_diameter_mm": cylinder.outers[0]}
+        if cylinder.inners[0]:
+            piece["inner_diameter_mm"] = cylinder.inners[0]
+        if cylinder.outers[1] != cylinder.outers[0]:
+            piece["outer_diameter_end_mm"] = cylinder.outers[1]
+        if cylinder.inners[1] != cylinder.inners[0]:
+            piece["inner_diameter_end_mm"] = cylinder.inners[1]
         pieces.append(piece)
     entries = {
         "start_z_mm": read(sections[0].start, "support_vector of the shaft"),
@@ -227,8 +225,6 @@ def gear_places(teeth: Teeth, bodies: RigidGroups) -> dict[str, float]:
             found.setdefault(body.carrier, found[body.name])
     return {name: z for name, z in found.items() if math.isfinite(z)}
 
-
-# Conversion of a REXS file to a gearbox file; all errors are reported together, and assumptions are marked
 
 SPEED_TOLERANCE = 1e-3
 """Largest relative difference between a speed in the file and the kinematic speed."""
@@ -396,9 +392,7 @@ class _GearboxDraft:
         entries = [
             f"{name} is {comment}" for name, comment in blocks.items() if name in words or name.split(".")[1] in words
         ]
-        if entries:
-            return f"{error} ({'; '.join(entries)})"
-        return error
+        return f"{error} ({'; '.join(entries)})" if entries else error
 
     def leave_stiff(self, source: str, path: str | Path) -> None:
         """Set bodies to rigid in all variants if their shape cannot contain the seats, and record the reason."""
@@ -506,17 +500,17 @@ def _compare_speeds(gearbox: Gearbox, loads: Sequence[ImportedLoads], ends: Ends
     if gearbox.train.degrees_of_freedom != 1:
         return
     mode = dict(zip(gearbox.spinning, gearbox.train.kinematic_modes[:, 0].tolist(), strict=True))
-    for load in loads:
-        base = load.speeds.get(ends.input)
-        for body, speed in load.speeds.items():
+    for load_case in loads:
+        base = load_case.speeds.get(ends.input)
+        for body, speed in load_case.speeds.items():
             if not base or body == ends.input or body not in mode:
                 continue
             rolls = base * mode[body] / mode[ends.input]
             notes.checked.append(
-                f"{load.name}: {body} rotates at {speed:.6g} rpm, kinematics result in {rolls:.6g} rpm"
+                f"{load_case.name}: {body} rotates at {speed:.6g} rpm, kinematics result in {rolls:.6g} rpm"
             )
             if abs(rolls - speed) > SPEED_TOLERANCE * max(abs(rolls), abs(speed)):
                 notes.errors.append(
-                    f"{load.name}: the file has {body} at {speed:g} rpm, but with {ends.input} at {base:g} rpm the "
-                    f"kinematics result in {rolls:g} rpm"
+                    f"{load_case.name}: the file has {body} at {speed:g} rpm, but with {ends.input} at {base:g} rpm "
+                    f"the kinematics result in {rolls:g} rpm"
                 )

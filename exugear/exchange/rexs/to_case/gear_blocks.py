@@ -71,9 +71,9 @@ def teeth_of(model: Model, places: ComponentPositions, bodies: RigidGroups, note
             _check_direction(places, part, both, notes)
     notes.errors.tell()
     mates: dict[int, list[Component]] = {}
-    for _, (one, other) in met.values():
-        mates.setdefault(one.number, []).append(other)
-        mates.setdefault(other.number, []).append(one)
+    for _, (component, mate) in met.values():
+        mates.setdefault(component.number, []).append(mate)
+        mates.setdefault(mate.number, []).append(component)
     gears: dict[int, Toothing] = {}
     for number, partners in mates.items():
         with notes.errors.gathered():
@@ -112,8 +112,8 @@ def first_of_planets(model: Model, places: ComponentPositions, bodies: RigidGrou
     return {
         number: own
         for body in bodies.members
-        for each in body.others
-        for own, number in zip(ordered(body.parts), ordered(each), strict=True)
+        for planet in body.others
+        for own, number in zip(ordered(body.parts), ordered(planet), strict=True)
     }
 
 
@@ -126,10 +126,10 @@ def _stage(model: Model, roles: Mapping[str, int]) -> tuple[Component, list[Comp
 
 def _check_direction(places: ComponentPositions, stage: Component, gears: Sequence[Component], notes: Notes) -> None:
     """Compare the direction of the line of centres with the positions."""
-    one, other = (places.position(gear) for gear in gears)
+    first, second = (places.position(gear) for gear in gears)
     stated = stage.quantity("rotating_angle_around_neg_u_axis")
     # Angle of the second gear's centre as seen from the first, zero along w and positive towards v.
-    angle = math.degrees(math.atan2(other[0] - one[0], other[1] - one[1]))
+    angle = math.degrees(math.atan2(second[0] - first[0], second[1] - first[1]))
     if stated is not None and abs(math.remainder(stated - angle, 360.0)) > ANGLE_TOLERANCE:
         notes.checked.append(
             f"{stage}: rotated by {stated:g} deg in the file, by {angle:.4f} deg from the gear positions"
@@ -143,14 +143,14 @@ def _ordered(
     notes: Notes,
 ) -> list[Stage]:
     stages = []
-    for part, (one, other) in met:
+    for part, (first, second) in met:
         with notes.errors.gathered():
-            if gears[one.number].internal and gears[other.number].internal:
+            if gears[first.number].internal and gears[second.number].internal:
                 raise RexsError(f"{part}: two ring gears cannot mesh")
             pinion, gear = sorted(
-                (one, other), key=lambda each: (gears[each.number].internal, gears[each.number].teeth)
+                (first, second), key=lambda gear: (gears[gear.number].internal, gears[gear.number].teeth)
             )
-            apart = math.dist(places.position(one)[:2], places.position(other)[:2])
+            apart = math.dist(places.position(first)[:2], places.position(second)[:2])
             both = gears[pinion.number], gears[gear.number]
             if both[1].internal and both[1].teeth <= both[0].teeth:
                 raise RexsError(f"{part}: a ring gear of {both[1].teeth} teeth is too small for {both[0].teeth}")
@@ -165,10 +165,10 @@ def _common_face(places: ComponentPositions, stage: Component, pinion: Toothing,
     least = min(pinion.face_width.value, gear.face_width.value)
     low = -math.inf
     high = math.inf
-    for one in (pinion, gear):
-        z = places.position(one.part)[2]
-        low = max(low, z - 0.5 * one.face_width.value)
-        high = min(high, z + 0.5 * one.face_width.value)
+    for toothing in (pinion, gear):
+        z = places.position(toothing.part)[2]
+        low = max(low, z - 0.5 * toothing.face_width.value)
+        high = min(high, z + 0.5 * toothing.face_width.value)
     stated = stage.quantity("common_face_width")
     overlap = tidy(round(high - low, 6))
     if stated is not None and stated < min(least, overlap) - FACE_TOLERANCE:
@@ -179,11 +179,11 @@ def _common_face(places: ComponentPositions, stage: Component, pinion: Toothing,
 
 
 def _check_equal_planets(model: Model, first: Mapping[int, int], gears: Mapping[int, Toothing], notes: Notes) -> None:
-    for number, own in first.items():
-        if own not in gears:
+    for number, planet in first.items():
+        if planet not in gears:
             continue
         other = toothing_of(model, model.components[number], [], Notes())
-        mate = gears[own]
+        mate = gears[planet]
         for key in ("module", "face_width", "helix_angle", "pressure_angle"):
             if abs(getattr(other, key).value - getattr(mate, key).value) > 1e-9:
                 notes.errors.append(f"{other.part}: differs from {mate.part} in {key}; planets of a set must be equal")
@@ -290,7 +290,7 @@ def _gear_names(
 def _pair_names(gears: Mapping[int, Toothing], stages: Sequence[Stage], owners: Mapping[int, RigidGroup]) -> list[str]:
     names: list[str] = []
     for number, stage in enumerate(stages, 1):
-        planet = next((owners[one].name for one in stage.both if owners[one].carrier), "")
+        planet = next((owners[gear].name for gear in stage.both if owners[gear].carrier), "")
         both = owners[stage.pinion].carrier and owners[stage.gear].carrier
         mate = "ring" if gears[stage.gear].internal else "sun"
         name = f"{mate}_{planet}" if planet and not both else ""

@@ -152,7 +152,9 @@ def _point_force(
     moment = np.array([0.0, *(load.quantity(key) or 0.0 for key in MOMENTS)])
     if not force.any() and not moment.any():
         return None
-    size = " and ".join(f"{np.linalg.norm(one):g} {unit}" for one, unit in ((force, "N"), (moment, "N m")) if one.any())
+    size = " and ".join(
+        f"{np.linalg.norm(vector):g} {unit}" for vector, unit in ((force, "N"), (moment, "N m")) if vector.any()
+    )
     if shaft is None or body is None:
         notes.lost.append(f"{load}: {size}; the body it acts on is fixed, is a planet, or is not imported")
         return None
@@ -233,16 +235,16 @@ def force_blocks(loads: Sequence[ImportedLoads], ends: Ends, notes: Notes) -> di
 
     If forces differ between load cases, this is reported.
     """
-    static = max(loads, key=lambda one: abs(one.torques.get(ends.input, 0.0)))
+    static = max(loads, key=lambda loading: abs(loading.torques.get(ends.input, 0.0)))
     blocks = {}
-    for number, one in static.forces.items():
+    for number, point_force in static.forces.items():
         key = ", ".join((*FORCES, *MOMENTS))
-        entries = {"body": Entry(one.body), "z_mm": read(one.z, "u_coordinate_on_shaft")}
-        if any(one.force):
-            entries["force_N"] = read(list(one.force), key)
-        if any(one.moment):
-            entries["moment_N_m"] = read(list(one.moment), key)
-        blocks[f"load_{number}"] = Block(str(one.part), entries)
+        entries = {"body": Entry(point_force.body), "z_mm": read(point_force.z, "u_coordinate_on_shaft")}
+        if any(point_force.force):
+            entries["force_N"] = read(list(point_force.force), key)
+        if any(point_force.moment):
+            entries["moment_N_m"] = read(list(point_force.moment), key)
+        blocks[f"load_{number}"] = Block(str(point_force.part), entries)
     for number in sorted({number for one in loads for number in one.forces}):
         found = [one.forces[number] for one in loads if number in one.forces]
         part = found[0].part
@@ -330,7 +332,7 @@ def life_blocks(
     ratio : speed ratio output / input
     gears : gears by name, and whether their teeth are loaded in reversed bending
     """
-    rated = max(loads, key=lambda one: abs(one.torques.get(ends.input, 0.0)))
+    rated = max(loads, key=lambda loading: abs(loading.torques.get(ends.input, 0.0)))
     speed = abs(_input_speed(rated, ends, ratio))
     blocks = {}
     if speed:
@@ -366,10 +368,10 @@ def _spectrum(
     life = assumed(USUAL_YEARS, "no operating_time in the file")
     if hours:
         life = derived(_rounded(hours / HOURS_PER_YEAR), f"operating_time of {hours:g} h")
-    each = [(hours or life.value * HOURS_PER_YEAR) * share / sum(shares) for share in shares]
+    durations = [(hours or life.value * HOURS_PER_YEAR) * share / sum(shares) for share in shares]
     lines = [
         f"{load.torques[body]!r},{tidy(speed)!r},{_rounded(duration)!r}\n"
-        for load, speed, duration in zip(loads, speeds, each, strict=True)
+        for load, speed, duration in zip(loads, speeds, durations, strict=True)
     ]
     return body, life, lines
 
@@ -385,8 +387,8 @@ def _lubricant(model: Model) -> Block | None:
     entries, oil = min(oils, key=lambda one: one[0][cold].value)
     entries[cold] = replace(entries[cold], source=f"{entries[cold].source} of the lubricant")
     entries |= entries_of(READ["oil density"], oil, limits=DENSITIES)
-    casings = [one for case in (None, *model.load_cases) for one in model.components_in(case, "gear_casing")]
-    temperatures = [one.quantity("temperature_lubricant") for one in casings]
+    casings = [casing for case in (None, *model.load_cases) for casing in model.components_in(case, "gear_casing")]
+    temperatures = [casing.quantity("temperature_lubricant") for casing in casings]
     hottest = max((t for t in temperatures if t is not None), default=math.nan)
     if TEMPERATURES[0] <= hottest <= TEMPERATURES[1]:
         entries["temperature_C"] = read(tidy(hottest), "temperature_lubricant of the casing (hottest load case)")

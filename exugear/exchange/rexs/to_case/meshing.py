@@ -107,8 +107,11 @@ def _confirmed(
     if pinion.signed_shift is None or gear.signed_shift is None:
         return "agreeing"
     total = pinion.signed_shift + gear.signed_shift
-    asked = [pair_relations.shift_sum(unchecked("", pinion), unchecked("", gear), MM * one) for one in (apart, stated)]
-    fits = [one is not None and abs(one - total) <= SHIFT_TOLERANCE for one in asked]
+    asked = [
+        pair_relations.shift_sum(unchecked("", pinion), unchecked("", gear), MM * distance)
+        for distance in (apart, stated)
+    ]
+    fits = [shift is not None and abs(shift - total) <= SHIFT_TOLERANCE for shift in asked]
     if fits[0] == fits[1]:
         return "agreeing"
     if fits[0]:
@@ -187,7 +190,7 @@ def _solved(gears: Mapping[int, Toothing], stages: Sequence[Stage]) -> dict[int,
     solved = dict(gears)
     open_stages = list(stages)
     while open_stages:
-        ready = [one for one in open_stages if any(solved[number].shift for number in one.both)]
+        ready = [stage for stage in open_stages if any(solved[number].shift for number in stage.both)]
         for stage in ready or open_stages[:1]:
             open_stages.remove(stage)
             _complete(solved, stage)
@@ -218,7 +221,7 @@ def _replaceable(
     """
     found: list[int] = []
     for stage in wrong:
-        free = [number for number in stage.both if all(one in wrong for one in stages if number in one.both)]
+        free = [number for number in stage.both if all(other in wrong for other in stages if number in other.both)]
         zeros = [number for number in free if gears[number].signed_shift == 0.0]
         if len(zeros) == 1:
             found += zeros
@@ -266,7 +269,7 @@ def with_equal_racks(gears: Mapping[int, Toothing], stages: Sequence[Stage], not
     open_stages = list(stages)
     settled: set[int] = set()
     while open_stages:
-        stage = next((one for one in open_stages if settled & {*one.both}), open_stages[0])
+        stage = next((stage for stage in open_stages if settled & {*stage.both}), open_stages[0])
         open_stages.remove(stage)
         keep, other = stage.both[::-1] if stage.gear in settled else stage.both
         settled |= {keep, other}
@@ -499,12 +502,14 @@ def with_clear_tips(gears: dict[int, Toothing], stages: Sequence[Stage], notes: 
                 bound = _tip_bound(cleared, stage, tip)
             if bound is None:
                 continue
-            own = 2e3 * unchecked("", cleared[tip]).tip_radius
+            tip_diameter = 2e3 * unchecked("", cleared[tip]).tip_radius
             notes.changed.append(
-                f"{cleared[tip].part}: tip diameter {bound:g} mm instead of {own:.4f} mm, which reaches or is too "
-                f"close to the form diameter of {cleared[mate].part}"
+                f"{cleared[tip].part}: tip diameter {bound:g} mm instead of {tip_diameter:.4f} mm, which reaches or is "
+                f"too close to the form diameter of {cleared[mate].part}"
             )
-            entry = assumed(bound, f"{own:.4f} would be too close to the form diameter of {cleared[mate].part}")
+            entry = assumed(
+                bound, f"{tip_diameter:.4f} would be too close to the form diameter of {cleared[mate].part}"
+            )
             cleared[tip] = dataclasses.replace(cleared[tip], tip=entry)
     return cleared
 
@@ -514,11 +519,11 @@ def _tip_bound(gears: Mapping[int, Toothing], stage: Stage, which: int) -> float
     pinion = unchecked("pinion", gears[stage.pinion])
     gear = unchecked("gear", gears[stage.gear])
     pair = UncheckedPair(name="", pinion=pinion, gear=gear, centre_distance=MM * stage.distance.value)
-    for one, of in ((pinion, stage.pinion), (gear, stage.gear)):
-        if one.tip_radius <= one.base_radius:
+    for member, of in ((pinion, stage.pinion), (gear, stage.gear)):
+        if member.tip_radius <= member.base_radius:
             raise RexsError(
-                f"{gears[of].part}: its tip diameter of {2e3 * one.tip_radius:.6g} mm is inside its base diameter of "
-                f"{2e3 * one.base_radius:.6g} mm; correct tip_diameter or its tooth data"
+                f"{gears[of].part}: its tip diameter of {2e3 * member.tip_radius:.6g} mm is inside its base diameter "
+                f"of {2e3 * member.base_radius:.6g} mm; correct tip_diameter or its tooth data"
             )
     tip = gear if which == stage.gear else pinion
     margin = (MARGIN if gears[which].tip else pair_relations.ROOT_MARGIN) * tip.normal_module
@@ -546,15 +551,15 @@ def modification_of(model: Model, gear: Toothing, notes: Notes) -> dict[str, Ent
             notes.changed.append(f"{part} of {gear.part}: not imported; set it in [gears.NAME.modification]")
     entries: dict[str, Entry] = {}
     for kind in IMPORTED_MODIFICATIONS:
-        one = left.get(kind)
+        first = left.get(kind)
         other = right.get(kind)
-        if one is None and other is None:
+        if first is None and other is None:
             continue
-        if one is None or other is None or not _equal(one, other):
+        if first is None or other is None or not _equal(first, other):
             raise RexsError(f"{gear.part}: left and right flank differ in {kind}; only equal flanks can be imported")
-        found = dict(_entries(gear, one, notes))
+        found = dict(_entries(gear, first, notes))
         if not found:
-            notes.changed.append(f"{one} of {gear.part}: not imported, its numbers cannot be interpreted")
+            notes.changed.append(f"{first} of {gear.part}: not imported, its numbers cannot be interpreted")
         entries |= found
     return entries | dict(_blanks(gear, left, right, notes))
 
@@ -565,7 +570,7 @@ def _blanks(
     """Yield slopes of the file as zeros to be completed, since their signs are not defined; skip zero slopes."""
     for kind, key in ((row.attribute, row.key) for row in READ["unsigned"]):
         part = left.get(kind) or right.get(kind)
-        amounts = [one[kind].quantity(kind) for one in (left, right) if kind in one]
+        amounts = [side[kind].quantity(kind) for side in (left, right) if kind in side]
         if part is None or not any(amounts):
             continue
         said = ", ".join(dict.fromkeys(f"{_um(amount):g} um" for amount in amounts if amount))
@@ -578,8 +583,10 @@ def _blanks(
 
 def _modification_by_type(model: Model, gear: Component, side: str) -> dict[str, Component]:
     flanks = model.related("flank", "gear", gear.number, side)
-    found = [one for flank in flanks for one in model.related("reference", "origin", flank.number, "referenced")]
-    return {one.type: one for one in found if one.type in MODIFICATIONS}
+    found = [
+        component for flank in flanks for component in model.related("reference", "origin", flank.number, "referenced")
+    ]
+    return {component.type: component for component in found if component.type in MODIFICATIONS}
 
 
 def _equal(component: Component, other: Component) -> bool:

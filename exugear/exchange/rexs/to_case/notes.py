@@ -35,9 +35,7 @@ class Entry:
     @property
     def comment(self) -> str:
         """Comment after the value."""
-        if self.kind:
-            return f"{self.kind}   {self.source}"
-        return self.source
+        return f"{self.kind}   {self.source}" if self.kind else self.source
 
 
 def read(value: Any, source: str) -> Entry:
@@ -73,7 +71,7 @@ def entries_of(
         if row.key in entries:
             continue
         found = (part.quantity(row.attribute) for part in parts if part is not None)
-        value = next((row.factor * one for one in found if one or (zeros and one is not None)), None)
+        value = next((row.factor * value for value in found if value or (zeros and value is not None)), None)
         if value is not None and limits[0] <= value <= limits[1]:
             entries[row.key] = read(tidy(value), row.attribute)
     return entries
@@ -160,8 +158,8 @@ def _table(name: str, block: Block) -> Iterator[str]:
 
 
 def _line(key: str, entry: Entry) -> str:
-    if isinstance(entry.value, list) and any(isinstance(one, Mapping) for one in entry.value):
-        rows = "".join(f"    {toml_value(one)},\n" for one in entry.value)
+    if isinstance(entry.value, list) and any(isinstance(row, Mapping) for row in entry.value):
+        rows = "".join(f"    {toml_value(row)},\n" for row in entry.value)
         return f"{_with_comment(f'{key} = [', entry.comment)}\n{rows}]"
     return _with_comment(f"{key} = {toml_value(entry.value)}", entry.comment)
 
@@ -265,9 +263,7 @@ class ComponentPositions(ReprMixin):
     def _outermost(self, parts: list[Component]) -> Floats:
         """Axes u, v, w of the gear unit as columns; those of the first part in a file without a gear unit."""
         first = [*self._model.components_of_type("gear_unit"), *parts][:1]
-        if first:
-            return self._frame(first[0], 0)[1]
-        return np.eye(3)
+        return self._frame(first[0], 0)[1] if first else np.eye(3)
 
     def _frame(self, part: Component, depth: int) -> tuple[Floats, Floats]:
         """Origin (3) and axes u, v, w as columns (3, 3), in the outermost frame."""

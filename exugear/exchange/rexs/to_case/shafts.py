@@ -68,16 +68,16 @@ def inertia_of(cylinders: Iterable[Cylinder]) -> MassProperties:
     """
     return mass_properties(
         Tube(
-            start=MM * one.start,
-            length=MM * one.length,
-            outer=MM * one.outers[0],
-            inner=MM * one.inners[0],
-            density=one.density,
-            outer_end=MM * one.outers[1],
-            inner_end=MM * one.inners[1],
-            aside=MM * one.aside,
+            start=MM * cylinder.start,
+            length=MM * cylinder.length,
+            outer=MM * cylinder.outers[0],
+            inner=MM * cylinder.inners[0],
+            density=cylinder.density,
+            outer_end=MM * cylinder.outers[1],
+            inner_end=MM * cylinder.inners[1],
+            aside=MM * cylinder.aside,
         )
-        for one in cylinders
+        for cylinder in cylinders
     )
 
 
@@ -120,7 +120,7 @@ def sections_of(
             outers = outers[::-1]
             inners = inners[::-1]
         pieces.append(Cylinder(tidy(round(origin + start, 6)), tidy(length), outers, inners, density, aside))
-    return sorted(pieces, key=lambda one: one.start)
+    return sorted(pieces, key=lambda cylinder: cylinder.start)
 
 
 def _density(model: Model, part: Component, notes: Notes) -> float:
@@ -142,12 +142,12 @@ def seat_diameter(sections: Sequence[Cylinder], z: float, width: float, internal
     """Seat diameter of a gear, mm: the largest shaft diameter under it; for a ring gear the bore around it."""
     low = z - 0.5 * width
     high = z + 0.5 * width
-    under = [one for one in sections if one.start < high - TOUCHING and one.end > low + TOUCHING]
+    under = [section for section in sections if section.start < high - TOUCHING and section.end > low + TOUCHING]
     if not under:
         return None
     if internal:
-        return min(end for one in under for end in one.inners)
-    return max(end for one in under for end in one.outers)
+        return min(end for cylinder in under for end in cylinder.inners)
+    return max(end for cylinder in under for end in cylinder.outers)
 
 
 def gear_tube(model: Model, gear: Toothing, z: float, seat: float | None, notes: Notes) -> Cylinder:
@@ -184,14 +184,14 @@ def levelled(sections: Sequence[Cylinder], seats: Iterable[tuple[str, float, flo
         high = z + 0.5 * width
         pieces = _lengthened(pieces, name, (low, high), notes)
         pieces = [part for piece in pieces for part in _cut(piece, (low, high))]
-        under = [one for one in pieces if low - TOUCHING < one.start and one.end < high + TOUCHING]
+        under = [piece for piece in pieces if low - TOUCHING < piece.start and piece.end < high + TOUCHING]
         outers = [end for one in under for end in one.outers]
         if len(under) < 2 or len(set(outers)) < 2 or min(outers) < (1.0 - LEVELLED) * max(outers):
             continue
         least = min(outers)
         most = max(outers)
         notes.changed.append(f"{name}: shaft of {least:g} to {most:g} mm under it modelled as {most:g}")
-        pieces = [dataclasses.replace(one, outers=(most, most)) if one in under else one for one in pieces]
+        pieces = [dataclasses.replace(piece, outers=(most, most)) if piece in under else piece for piece in pieces]
     return _merged(pieces)
 
 

@@ -162,10 +162,12 @@ def _steps(model: Model, gear: Component) -> list[tuple[Component, Component | N
     """
     for part in (gear, *model.related("flank", "gear", gear.number, "left")):
         relations = [
-            one for one in model.relations_of("manufacturing_step") if one.roles.get("workpiece") == part.number
+            relation
+            for relation in model.relations_of("manufacturing_step")
+            if relation.roles.get("workpiece") == part.number
         ]
         steps: list[tuple[Component, Component | None]] = []
-        for relation in sorted(relations, key=lambda one: one.order):
+        for relation in sorted(relations, key=lambda relation: relation.order):
             settings = model.components.get(relation.roles.get("manufacturing_settings", -1))
             if relation.roles.get("tool") in model.components:
                 steps.append((model.components[relation.roles["tool"]], settings))
@@ -298,7 +300,7 @@ def _allowances(gear: Component, angle: float, helix: float, internal: bool) -> 
         upper, lower = (gear.quantity(key.format(end)) for end in ("upper", "lower"))
         if upper is not None and lower is not None and lower <= upper <= 0.0:
             ends = {"upper": upper, "lower": lower}
-            table = {f"{end}_allowance_um": tidy(round(1e3 * factor * one, 6)) for end, one in ends.items()}
+            table = {f"{end}_allowance_um": tidy(round(1e3 * factor * allowance, 6)) for end, allowance in ends.items()}
             return read(table, key.format("upper and lower"))
     return None
 
@@ -316,7 +318,7 @@ def _thinning(gear: Component, module: float, allowances: Entry | None, helix: f
 def material_of(model: Model, part: Component) -> Component | None:
     """Material that a component refers to."""
     found = model.related("reference", "origin", part.number, "referenced")
-    return next((one for one in found if one.type == "material"), None)
+    return next((component for component in found if component.type == "material"), None)
 
 
 def is_rigid(material: Component | None) -> bool:

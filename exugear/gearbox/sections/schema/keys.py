@@ -115,9 +115,7 @@ def _bare(kind: Any) -> Any:
         return _bare(get_args(kind)[0])
     if get_origin(kind) in (Union, UnionType):
         others = [part for part in get_args(kind) if part is not NoneType]
-        if len(others) == 1:
-            return _bare(others[0])
-        return kind
+        return _bare(others[0]) if len(others) == 1 else kind
     return kind
 
 
@@ -180,9 +178,7 @@ def written(value: object) -> str:
         return str(value).lower()
     if isinstance(value, float):
         short = f"{value:g}"
-        if set(short) & set(".e"):
-            return short
-        return f"{short}.0"
+        return short if set(short) & set(".e") else f"{short}.0"
     if isinstance(value, Mapping):
         return f"{{ {', '.join(f'{key} = {written(entry)}' for key, entry in value.items())} }}"
     if isinstance(value, tuple | list):

@@ -28,7 +28,7 @@ from exugear.gearbox.sections.connections import (
     BearingType,
     CatalogueSection,
 )
-from exugear.gearbox.units import KN, MM, UM
+from exugear.gearbox.units import KN, MM, UM, si
 from exugear.system.bearings.rolling import dimensions
 from exugear.system.bearings.rolling.rows import BallRow, BearingError, RollerRow, RollingRow, moved, pair_rows, rib_row
 
@@ -295,25 +295,20 @@ def _common(section: CatalogueSection) -> dict[str, Any]:
             f"element_count = {count} rolling elements of element_diameter_mm = {diameter:g} do not fit on "
             f"pitch_diameter_mm = {pitch:g}; {most} do"
         )
+    mean = 0.5 * (section.bore_mm + section.outer_diameter_mm)
     return {
         "element_diameter": MM * diameter,
         "pitch_diameter": MM * pitch,
         "element_count": count,
-        "radial_clearance": MM * (section.radial_clearance_mm - _thermal_change(section)),
+        "radial_clearance": MM * (section.radial_clearance_mm - (EXPANSION * mean * section.inner_ring_hotter_K)),
         "aligning": section.type in SPHERES,
     }
-
-
-def _thermal_change(section: CatalogueSection) -> float:
-    """Diametral clearance that a hotter inner ring takes, mm: alpha d_m times the difference of temperatures."""
-    mean = 0.5 * (section.bore_mm + section.outer_diameter_mm)
-    return EXPANSION * mean * section.inner_ring_hotter_K
 
 
 def _roller_row(section: CatalogueSection) -> RollerRow:
     """One row in the middle of the bearing, without its contact angle."""
     common = _common(section)
-    length = MM * _given(section, "element_length_mm")
+    length = si(section, "element_length_mm")
     profile: dict[str, Any] = {}
     if section.type in SPHERES:
         raceway = _outer_raceway_radius(section)
@@ -337,7 +332,7 @@ def _outer_raceway_radius(section: CatalogueSection) -> float:
 def _ball_row(section: CatalogueSection) -> BallRow:
     """One row in the middle of the bearing, without its contact angle."""
     if section.type == "self_aligning_ball":
-        outer = _outer_raceway_radius(section) / (MM * _given(section, "element_diameter_mm"))
+        outer = _outer_raceway_radius(section) / si(section, "element_diameter_mm")
     else:
         outer = _given(section, "outer_groove_ratio")
     return BallRow(**_common(section), inner_conformity=_given(section, "inner_groove_ratio"), outer_conformity=outer)
@@ -348,10 +343,10 @@ def _placed(section: CatalogueSection, row: RollerRow | BallRow) -> tuple[Rollin
     angle = math.radians(section.contact_angle_deg or 0.0)
     signed = angle if section.locates_towards == "+z" else -angle
     if section.type == "four_point_ball":
-        return tuple(moved(row, each, 0.0) for each in (-angle, angle))
+        return tuple(moved(row, signed, 0.0) for signed in (-angle, angle))
     if section.arrangement != "single":
-        distance = MM * _given(section, "row_distance_mm")
-        preload = UM * section.axial_preload_um
+        distance = si(section, "row_distance_mm")
+        preload = si(section, "axial_preload_um")
         return pair_rows(moved(row, signed, 0.0), section.arrangement, distance, preload)
     if section.type == "thrust_spherical_roller":
         # All rollers press on one point of the axis, beside the bearing.
@@ -362,7 +357,7 @@ def _placed(section: CatalogueSection, row: RollerRow | BallRow) -> tuple[Rollin
         # Both rows point to the middle of the bearing.
         place = 0.5 * row.pitch_diameter * math.tan(angle)
         return moved(row, -angle, -place), moved(row, angle, place)
-    distance = MM * _given(section, "row_distance_mm") if rows > 1 else 0.0
+    distance = si(section, "row_distance_mm") if rows > 1 else 0.0
     return tuple(moved(row, signed, (number - 0.5 * (rows - 1)) * distance) for number in range(rows))
 
 
@@ -370,12 +365,12 @@ def _ribs(section: CatalogueSection, row: RollerRow | BallRow) -> tuple[RollerRo
     """Ribs of cylindrical rollers as rows of their own, first those that hold the inner ring against +z."""
     if section.ribs == "none" or not isinstance(row, RollerRow):
         return ()
-    length = MM * _given(section, "rib_contact_mm")
+    length = si(section, "rib_contact_mm")
     senses = {"+z": (1,), "-z": (-1,), "both": (1, -1)}[section.ribs]
     return tuple(rib_row(row, sense, length) for sense in senses)
 
 
-# Load ratings that makers print for a designation, and how far estimates may lie above printed ones
+# Catalogue load ratings, and the largest ratio of estimates to them
 
 WITHIN = 0.005
 """Part by which dimensions may differ from those of the designation."""
@@ -483,9 +478,7 @@ def _listed_as(section: CatalogueSection) -> tuple[str, ...]:
     if prefix is not None:
         return ()
     if section.type == "angular_contact_ball":
-        if suffix.startswith("B"):
-            return (f"{number}B",)
-        return ()
+        return (f"{number}B",) if suffix.startswith("B") else ()
     if section.type == "self_aligning_ball" and _SEALED.search(suffix):
         return ()
     return (number,)

@@ -173,9 +173,9 @@ def frictional_moment(
     known = friction_constants(section.type)
     series = friction_series(section)
     n = abs(speed) / RPM
-    each = [_Operation(share, own, mean, n, static_rating / len(axial_loads), factor) for own in axial_loads]
+    operations = [_Operation(share, axial, mean, n, static_rating / len(axial_loads), factor) for axial in axial_loads]
     moments = [
-        sum(_moment(section, known[name], operation, 1e6 * viscosity) for operation in each)
+        sum(_moment(section, known[name], operation, 1e6 * viscosity) for operation in operations)
         for name in known
         if series in ("", name)
     ]
@@ -197,9 +197,6 @@ def _moment(section: CatalogueSection, k: Constants, at: _Operation, viscosity: 
     thin = math.exp(-2.6e-8 * product**1.4 * at.mean)
     coefficient = thin * THIN_FILM + (1.0 - thin) * FULL_FILM.get(section.type, 0.05)
     return float(1e-3 * (heating * starvation * rolling * product**0.6 + sliding * coefficient))
-
-
-# Variables G_rr and G_sl of each type
 
 
 def _deep_groove(k: Constants, at: _Operation) -> tuple[float, float]:

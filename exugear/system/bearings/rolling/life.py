@@ -132,9 +132,7 @@ def reference_life(
         for capacity, power in zip(capacities, (inner, outer), strict=True):
             mean = np.mean((stressed / (share * capacity)) ** power, axis=0) ** (1.0 / power)
             damage += float(np.sum(mean**exponent))
-    if damage == 0.0:
-        return math.inf
-    return float(damage ** (-1.0 / slope))
+    return math.inf if damage == 0.0 else float(damage ** (-1.0 / slope))
 
 
 def edge_stress_factors(laminae: int) -> Floats:
@@ -202,8 +200,6 @@ def _ring_capacities(row: RollingRow, row_rating: float, bearing_type: BearingTy
     return common / 0.378 * (1.0 + weaker) ** power, common / 0.364 * (1.0 + 1.0 / weaker) ** power
 
 
-# Modified rating life of rolling bearings by ISO 281:2007: viscosity, cleanliness and fatigue limit
-
 CONTAMINATION: dict[Cleanliness, tuple[float, float]] = {
     "extreme": (1.0, 1.0),
     "high": (0.6, 0.8),
@@ -239,8 +235,8 @@ def viscosity_at(temperature: float, viscosity_40: float, viscosity_100: float) 
     >>> round(viscosity_at(80.0, 220.0, 19.0) * 0.890 * (1.0 - 0.0007 / 0.890 * 65.0), 1)
     30.1
     """
-    double = [math.log10(math.log10(one + _WALTHER)) for one in (viscosity_40, viscosity_100)]
-    place = [math.log10(one + _FREEZING) for one in (40.0, 100.0, temperature)]
+    double = [math.log10(math.log10(viscosity + _WALTHER)) for viscosity in (viscosity_40, viscosity_100)]
+    place = [math.log10(celsius + _FREEZING) for celsius in (40.0, 100.0, temperature)]
     slope = (double[1] - double[0]) / (place[1] - place[0])
     return float(10.0 ** (10.0 ** (double[0] + slope * (place[2] - place[0]))) - _WALTHER)
 

@@ -191,9 +191,7 @@ def groove_contacts(row: BallRow) -> tuple[EllipticContact, EllipticContact]:
 
 def _outer(row: BallRow) -> float:
     """Radius of the outer raceway across the rolling direction, over the ball's diameter."""
-    if row.aligning:
-        return 0.5 * (1.0 / row.diameter_ratio + 1.0)
-    return row.outer_conformity
+    return 0.5 * (1.0 / row.diameter_ratio + 1.0) if row.aligning else row.outer_conformity
 
 
 def ball_constant(row: BallRow) -> float:
@@ -338,8 +336,6 @@ def ball_tangent(balls: BallArrays, displacement: Floats) -> Floats:
     symmetric: Floats = 0.5 * (tangent + tangent.T)
     return symmetric
 
-
-# Potentials of rolling bearings for the compiled law: rows to the arrays of `exugear.system.kernels.rolling`
 
 SLICES = 240
 """Slices of a roller: their sum is within 1e-4 of that of infinitely many where 30 are 1 % soft against tilting."""
@@ -522,7 +518,12 @@ class _Packing:
         sine = math.sin(row.contact_angle)
         layout = [0] * LAYOUT_SIZE
         geometry = np.zeros(GEOMETRY_SIZE)
-        layout[COUNT], layout[CIRCLE] = row.element_count, self._circle(row.element_count)
+        # First line of the cosines and sines of equally spaced elements.
+        if row.element_count not in self._first_on_circle:
+            self._first_on_circle[row.element_count] = sum(len(circle) for circle in self.circles)
+            angles = 2.0 * math.pi * np.arange(row.element_count) / row.element_count
+            self.circles.append(np.column_stack([np.cos(angles), np.sin(angles)]))
+        layout[COUNT], layout[CIRCLE] = row.element_count, self._first_on_circle[row.element_count]
         geometry[[COSINE, SINE, GAP]] = cosine, sine, 0.5 * row.radial_clearance * cosine
         if row.aligning:
             geometry[LEVER] = -row.sphere_centre * cosine
@@ -565,11 +566,3 @@ class _Packing:
         geometry[CONSTANT], geometry[SLICE_LENGTH] = row.contact_constant / SLICES, row.effective_length / SLICES
         geometry[PER_TILT], geometry[MOST_TILT] = strips**2 / table.most_tilt, table.most_tilt
         geometry[PER_ROOT], geometry[MOST_DEPTH] = steps / math.sqrt(table.most_depth), table.most_depth
-
-    def _circle(self, count: int) -> int:
-        """First line of the cosines and sines of equally spaced elements."""
-        if count not in self._first_on_circle:
-            self._first_on_circle[count] = sum(len(circle) for circle in self.circles)
-            angles = 2.0 * math.pi * np.arange(count) / count
-            self.circles.append(np.column_stack([np.cos(angles), np.sin(angles)]))
-        return self._first_on_circle[count]

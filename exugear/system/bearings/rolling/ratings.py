@@ -416,9 +416,7 @@ def _static_factors(rows: Sequence[RollingRow], bearing_type: BearingType) -> tu
         return 2.3 * math.tan(angle), 1.0
     else:
         y = 0.22 / math.tan(angle)
-    if _double_row(rows, bearing_type):
-        return (1.0, 2.0 * y)
-    return (0.5, y)
+    return (1.0, 2.0 * y) if _double_row(rows, bearing_type) else (0.5, y)
 
 
 def _double_row(rows: Sequence[RollingRow], bearing_type: BearingType) -> bool:

@@ -283,9 +283,6 @@ def _approached(row: Row, approach: float) -> Row:
     return replace(row, contact_angle=math.copysign(turned, row.contact_angle), radial_clearance=clearance)
 
 
-# Roller bearings from their boundary dimensions, for use from Python: rows of rollers
-
-
 @dataclass(frozen=True, kw_only=True)
 class CylindricalRollerBearing:
     """Single-row cylindrical roller bearing from its boundary dimensions.

@@ -18,7 +18,7 @@ from exugear.system.bodies.of_gearbox import shaft_model
 from exugear.system.bodies.reduction import ReducedBody
 from exugear.system.bodies.shaft_sections import ShaftSection
 from exugear.system.bodies.turned_shaft import ShaftModel, reduce_shaft
-from exugear.system.loads import Loading, LoadTable
+from exugear.system.loads import LoadTable
 from exugear.system.modes import BODY_MOTIONS, modes_of
 from exugear.system.statics import accelerating_start, linearise
 from exugear.system.system import Assembly
@@ -184,7 +184,7 @@ def test_rigid_variants_take_the_shaft_as_a_rigid_body(
 
 def test_both_solvers_join_the_shaft_to_the_carrier_at_its_seat(flexible: Assembly) -> None:
     rest = np.zeros(flexible.size)
-    _, found, _ = ExudynSystem(flexible, rest, rest, Loading(), with_meshes=False).linearised()
+    _, found, _ = ExudynSystem(flexible, rest, rest, LoadTable(), with_meshes=False).linearised()
     linear = linearise(flexible, rest)
     expected = sum(linear.stiffness[name] for name in linear.stiffness if name not in flexible.mesh_names)
     assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()

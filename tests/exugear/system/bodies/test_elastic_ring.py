@@ -11,7 +11,7 @@ import xarray as xr
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.loads import Loading, LoadTable
+from exugear.system.loads import LoadTable
 from exugear.system.signals import energy_residual
 from exugear.system.statics import accelerating_start, locked_equilibrium
 from exugear.system.system import Assembly
@@ -128,7 +128,7 @@ def test_compiled_solver_and_exudyn_run_alike(ringed: Assembly) -> None:
     states = np.empty((2, steps, ringed.size))
     system = CompiledSystem(ringed, q, v, LoadTable(LOAD), STEP)
     assert system.advance(0, states[0], states[1]) == steps
-    exudyn = ExudynSystem(ringed, q, v, Loading(constant=LOAD))
+    exudyn = ExudynSystem(ringed, q, v, LoadTable(constant=LOAD))
     exudyn.run(0.0, steps, STEP)
     _, end, _ = exudyn.state()
     moved = states[0, -1] - q

@@ -26,7 +26,7 @@ from exugear.system.bodies.solids import (
     reduce_matrices,
     reduce_solid,
 )
-from exugear.system.loads import Drive, Loading
+from exugear.system.loads import Drive, LoadTable
 from exugear.system.signals import energy_residual
 from exugear.system.statics import accelerating_start
 from exugear.system.system import Assembly
@@ -165,7 +165,7 @@ def trajectories(
         found.append((q.copy(), assembly.mesh_states(q, v)[:, 0]))
         return True
 
-    system = ExudynSystem(assembly, start.q, start.v, Loading(constant=load))
+    system = ExudynSystem(assembly, start.q, start.v, LoadTable(constant=load))
     assert system.run(0.0, steps, step, observe, explicit=False) == steps
     return np.array([q for q, _ in found]), np.array([dte for _, dte in found])
 
@@ -221,11 +221,12 @@ def test_all_that_acts_on_a_floating_body_acts_as_in_the_other_frame(gearbox: Ge
     plain = without_floating_frames(floating)
     start = accelerating_start(floating, LOAD, SPEED)
     angle = float(start.q[floating.spin["shaft"]])
-    drive = Drive("shaft", 5e3, 0.5, lambda t: angle + SPEED * t, lambda t: SPEED)
-    loading = Loading({"wheel": 9.0}, {"shaft": lambda t: 6.0 + 3.0 * math.sin(2000.0 * t)}, drive)
+    times = np.linspace(0.0, 1e-3, 101)
+    torques = 6.0 + 3.0 * np.sin(2000.0 * times)
+    loads = LoadTable({"wheel": 9.0}, {"shaft": (times, torques)}, Drive("shaft", 5e3, 0.5, (angle, SPEED, 0.0)))
     ends = []
     for assembly in (floating, plain):
-        system = ExudynSystem(assembly, start.q, start.v, loading)
+        system = ExudynSystem(assembly, start.q, start.v, loads)
         system.run(0.0, 100, 1e-5, explicit=False)
         ends.append(system.state()[1])
     moved = ends[1] - start.q - SPEED * 1e-3 * (floating.rolling_velocity(start.q, dict.fromkeys(floating.spin, 1.0)))
@@ -250,7 +251,7 @@ def test_a_run_goes_on_from_its_own_state(floating: Assembly) -> None:
     # What a resumed run starts from is the assembly's state; generalized-alpha forgets its accelerations, which
     # disturbs the motion by less than a thousandth.
     start = accelerating_start(floating, LOAD, SPEED)
-    whole = ExudynSystem(floating, start.q, start.v, Loading(constant=LOAD))
+    whole = ExudynSystem(floating, start.q, start.v, LoadTable(constant=LOAD))
     states = []
 
     def observe(t: float, q: np.ndarray, v: np.ndarray) -> bool:
@@ -258,7 +259,7 @@ def test_a_run_goes_on_from_its_own_state(floating: Assembly) -> None:
         return True
 
     whole.run(0.0, 200, 1e-5, observe, explicit=False)
-    rest = ExudynSystem(floating, *states[100], Loading(constant=LOAD))
+    rest = ExudynSystem(floating, *states[100], LoadTable(constant=LOAD))
     assert rest.state()[1] == pytest.approx(states[100][0], abs=1e-13)
     rest.run(1e-3, 100, 1e-5, explicit=False)
     place = floating.elastic_slices["shaft"]

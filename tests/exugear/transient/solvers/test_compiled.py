@@ -16,7 +16,7 @@ from exugear.results.run_file import load_run
 from exugear.results.spectra.resonances import order_cut
 from exugear.results.spectra.waterfall import order_lines
 from exugear.system.build import assemble
-from exugear.system.loads import DriveLaw, Loading, LoadTable
+from exugear.system.loads import Drive, LoadTable
 from exugear.system.signals import signal_layout
 from exugear.system.statics import accelerating_start
 from exugear.system.system import Assembly
@@ -127,19 +127,18 @@ def test_loads_over_time_are_those_that_exudyn_gets(grc: Gearbox, stiffness: dic
     loads = LoadTable(
         constant={"carrier": 10.0},
         series={"hss": (times, np.array([1.0, -3.0, 4.0, 5.0])), "carrier": (times[:2], np.array([7.0, 8.0]))},
-        drive=DriveLaw("lss", 1e4, 3.0, (0.1, 2.0, -1.5)),
+        drive=Drive("lss", 1e4, 3.0, (0.1, 2.0, -1.5)),
     )
     q, v = disturbed(assembly)
     system = CompiledSystem(assembly, q, v, loads, STEP)
-    plain = loads.as_functions()
     for t in (0.0, 0.012, 0.3, 0.7, 0.005):  # forwards, beyond the end, and back again
-        applied = plain.generalized(assembly, t, q, v)
+        applied = loads.generalized(assembly, t, q, v)
         assert system.accelerations(t) == pytest.approx(accelerations_of(assembly, q, v, applied), rel=1e-12)
 
 
 def exudyn_accelerations(assembly: Assembly, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Accelerations that Exudyn's own mass matrix and right-hand side give."""
-    system = ExudynSystem(assembly, q, v, Loading(LOAD))
+    system = ExudynSystem(assembly, q, v, LoadTable(LOAD))
     settings = exudyn.SimulationSettings()
     settings.timeIntegration.verboseMode = 0
     settings.solutionSettings.writeSolutionToFile = False

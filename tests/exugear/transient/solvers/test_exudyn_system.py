@@ -11,7 +11,7 @@ from exugear.gearbox.variant import VariantError
 from exugear.system.build import assemble
 from exugear.system.kernels.connectors import add_connector_forces
 from exugear.system.kernels.coordinates import add_spring_forces
-from exugear.system.loads import Loading
+from exugear.system.loads import LoadTable
 from exugear.system.modes import modes_of
 from exugear.system.statics import StartState, accelerating_start, linearise
 from exugear.system.system import Assembly
@@ -42,7 +42,7 @@ def trajectory(system: ExudynSystem, steps: int, step: float = STEP, explicit: b
 
 def test_observer_sees_start_and_every_step(grc: Gearbox, stiffness: dict) -> None:
     assembly, start = started(grc, stiffness, "rigid")
-    rows = trajectory(ExudynSystem(assembly, start.q, start.v, Loading(LOAD)), 10)
+    rows = trajectory(ExudynSystem(assembly, start.q, start.v, LoadTable(LOAD)), 10)
     assert rows[:, 0] == pytest.approx(STEP * np.arange(11), abs=1e-15)
     assert np.array_equal(rows[0, 1 : 1 + assembly.size], start.q)
 
@@ -50,7 +50,7 @@ def test_observer_sees_start_and_every_step(grc: Gearbox, stiffness: dict) -> No
 def test_both_mesh_routes_give_the_same_trajectory(grc: Gearbox, stiffness: dict) -> None:
     assembly, start = started(grc, stiffness, "bushing", 2.3)
     found = [
-        trajectory(ExudynSystem(assembly, start.q, start.v, Loading(LOAD), route), 40)[-1]
+        trajectory(ExudynSystem(assembly, start.q, start.v, LoadTable(LOAD), route), 40)[-1]
         for route in ("element", "loads")
     ]
     # The same forces by another path: round-off only.
@@ -60,7 +60,7 @@ def test_both_mesh_routes_give_the_same_trajectory(grc: Gearbox, stiffness: dict
 
 def test_repeated_runs_are_bitwise_equal(grc: Gearbox, stiffness: dict) -> None:
     assembly, start = started(grc, stiffness, "bushing")
-    first, second = (trajectory(ExudynSystem(assembly, start.q, start.v, Loading(LOAD)), 100) for _ in range(2))
+    first, second = (trajectory(ExudynSystem(assembly, start.q, start.v, LoadTable(LOAD)), 100) for _ in range(2))
     assert np.array_equal(first, second)
 
 
@@ -68,7 +68,7 @@ def test_matrices_of_exudyn_are_those_of_the_assembly(grc: Gearbox, stiffness: d
     """Bearings and couplings at rest, meshes left out."""
     assembly = assemble(grc, Choice("bushing"), stiffness)
     rest = np.zeros(assembly.size)
-    system = ExudynSystem(assembly, rest, rest, Loading(), with_meshes=False)
+    system = ExudynSystem(assembly, rest, rest, LoadTable(), with_meshes=False)
     mass, stiff, damping = system.linearised()
     linear = linearise(assembly, rest)
     others = [name for name in linear.stiffness if name not in assembly.mesh_names]
@@ -86,7 +86,7 @@ def test_exudyn_follows_the_assemblys_equations_of_motion(grc: Gearbox, stiffnes
     random = np.random.default_rng(2)
     q = start.q + 1e-5 * random.normal(size=assembly.size)
     v = start.v + 1e-2 * random.normal(size=assembly.size)
-    found = trajectory(ExudynSystem(assembly, q, v, Loading(LOAD)), 1)[-1]
+    found = trajectory(ExudynSystem(assembly, q, v, LoadTable(LOAD)), 1)[-1]
     applied = assembly.torque_vector(LOAD)
 
     def rate(state: np.ndarray) -> np.ndarray:
@@ -106,7 +106,7 @@ def test_exudyn_follows_the_assemblys_equations_of_motion(grc: Gearbox, stiffnes
 def test_joint_null_space_is_the_minimal_model(grc: Gearbox, stiffness: dict) -> None:
     jointed, minimal = assemble(grc, Choice("jointed"), stiffness), assemble(grc, Choice("rigid"), stiffness)
     rest = np.zeros(jointed.size)
-    system = ExudynSystem(jointed, rest, rest, Loading(), with_meshes=False)
+    system = ExudynSystem(jointed, rest, rest, LoadTable(), with_meshes=False)
     motions, mass = system.joint_null_space()
     assert motions.shape == (jointed.size, minimal.size)
     assert np.abs(mass - minimal.mass_matrix).max() < 1e-9 * minimal.mass_matrix.max()
@@ -119,8 +119,8 @@ def test_jointed_model_follows_the_minimal_one(grc: Gearbox, stiffness: dict) ->
     for body in jointed.bodies:
         q[jointed.spin[body.name]] = start.q[minimal.spin[body.name]]
     ends = [
-        trajectory(ExudynSystem(minimal, start.q, start.v, Loading(LOAD)), 400)[-1],
-        trajectory(ExudynSystem(jointed, q, v, Loading(LOAD)), 400, explicit=False)[-1],
+        trajectory(ExudynSystem(minimal, start.q, start.v, LoadTable(LOAD)), 400)[-1],
+        trajectory(ExudynSystem(jointed, q, v, LoadTable(LOAD)), 400, explicit=False)[-1],
     ]
     for body in minimal.bodies:
         one = ends[0][1 + minimal.size + minimal.spin[body.name]]
@@ -132,14 +132,14 @@ def test_jointed_model_follows_the_minimal_one(grc: Gearbox, stiffness: dict) ->
 def test_loads_route_needs_bodies(grc: Gearbox, stiffness: dict) -> None:
     assembly, start = started(grc, stiffness, "rigid")
     with pytest.raises(VariantError, match="mesh_route 'loads' requires bodies; use the variant jointed or bushing"):
-        ExudynSystem(assembly, start.q, start.v, Loading(LOAD), "loads")
+        ExudynSystem(assembly, start.q, start.v, LoadTable(LOAD), "loads")
 
 
 def test_gravity_acts_on_the_masses(grc: Gearbox, stiffness: dict) -> None:
     gearbox = grc.varied({"gravity.acceleration_m_per_s2": [0.0, -9.81, 0.0]})
     assembly = assemble(gearbox, Choice("bushing"), stiffness).unloaded
     rest = np.zeros(assembly.size)
-    system = ExudynSystem(assembly, rest, rest, Loading(), with_meshes=False)
+    system = ExudynSystem(assembly, rest, rest, LoadTable(), with_meshes=False)
     step = 1e-8
     end = trajectory(system, 1, step)[-1]
     o = assembly.coordinates["hss"][0]
@@ -161,7 +161,7 @@ def test_rigid_meshes_leave_the_train_and_its_couplings(grc: Gearbox) -> None:
     frequency = np.sqrt(1e6 * (1 / 0.39 + 1 / referred)) / (2 * np.pi)
     assert modes_of(assembly).frequency == pytest.approx([0.0, frequency], rel=1e-9)
     start = accelerating_start(assembly, LOAD)
-    rows = trajectory(ExudynSystem(assembly, start.q, start.v, Loading(LOAD)), 400)
+    rows = trajectory(ExudynSystem(assembly, start.q, start.v, LoadTable(LOAD)), 400)
     carrier = rows[-1, 1 + assembly.size + assembly.spin["carrier"]]
     assert carrier == pytest.approx(start.rates["carrier"] * 0.01, rel=1e-9)
     with pytest.raises(VariantError, match=": a kinematic constraint, which requires the variant rigid, not"):

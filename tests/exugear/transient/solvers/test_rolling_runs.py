@@ -10,7 +10,7 @@ import pytest
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.system.build import assemble
-from exugear.system.loads import Loading, LoadTable
+from exugear.system.loads import LoadTable
 from exugear.system.signals import signal_layout
 from exugear.system.statics import accelerating_start
 from exugear.system.system import Assembly
@@ -96,7 +96,7 @@ def test_a_floating_shaft_feels_its_rollers_as_in_the_frame_that_does_not_turn(
     for frame in (floating, without_floating_frames(floating)):
         # Light enough for the case: 2e7 N/m by rollers instead of springs, preloaded by a few um.
         assembly = on_rolling(frame, [(replace(small, radial_clearance=-1e-6),)], stiffness=0.5)
-        system = ExudynSystem(assembly, start.q, start.v, Loading({"shaft": 6.0, "wheel": 9.0}))
+        system = ExudynSystem(assembly, start.q, start.v, LoadTable({"shaft": 6.0, "wheel": 9.0}))
         system.run(0.0, 100, 1e-5, explicit=False)
         ends.append(system.state()[1])
     moved = ends[1] - start.q
