@@ -75,7 +75,7 @@ class Box:
 
 
 def short_section(material: ReportData) -> Part:
-    """Show the first resonance of the ranking: amplitudes, mode, cause, remedies, and what could overturn it."""
+    """Show the first resonance of the ranking: amplitudes, mode, cause, remedies, and what could change it."""
     headline = material.headline
     notes = material.context.notes.statements
     if headline is None:
@@ -330,7 +330,7 @@ def _further(
         peaks = ", ".join(amplitude_text(name, own.amplitude) for name, own in outside.amplitudes.items())
         yield "Just outside the range", [f"{rounded_text(outside.frequency)} Hz at {speed_text(outside)}: {peaks}."]
     if doubts := list(_doubts(material, headline, top)):
-        yield "What could overturn this", [short(*doubts)]
+        yield "What could change this answer", [short(*doubts)]
 
 
 def _shortfalls(material: ReportData) -> Iterator[str]:
@@ -442,7 +442,7 @@ def ranking_section(material: ReportData) -> Part:
         name="resonances",
         sortable=True,
         stacked=True,
-        hidden=("off rated / %", "place", "mode"),
+        hidden=("from rated / %", "place", "mode"),
     )
     html = render(
         "ranking",
@@ -469,7 +469,7 @@ def _row(
     }
     if rated is not None:
         off = 100.0 * (rpm / rated - 1.0)
-        row["off rated / %"] = Cell(f"{off:+.0f}".replace("-", "−").replace("+0", "0").replace("−0", "0"), off)
+        row["from rated / %"] = Cell(f"{off:+.0f}".replace("-", "−").replace("+0", "0").replace("−0", "0"), off)
     row["excited by"] = words.line(words.order(resonance.line, resonance.order))
     for name in _sorted_quantities(headline, resonance):
         own = resonance.amplitudes[name]

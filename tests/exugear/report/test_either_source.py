@@ -119,12 +119,12 @@ def test_with_run_ups_beside_them_both_sources_can_be_chosen(folder, tmp_path):
     simulated(gearbox, Choice("bushing", LAW, load_case="run_up"), stiffness, both)
     report = write_report(both)
     groups = data_of(report.path)["groups"]
-    assert [group["source"] for group in groups] == ["constant speed, time-varying stiffness", "run-up run up"]
+    assert [group["source"] for group in groups] == ["constant speed, time-varying stiffness", "run-up run_up"]
     assert 'id="group"' in report.path.read_text(encoding="utf-8")
     # The command line leads with constant speed; the run-up follows under its own name.
     assert len([line for line in report.statements if line.startswith("Highest resonance")]) == 1
     assert (
-        len([line for line in report.statements if line.startswith("Run-up run up: Highest transmission error")]) == 1
+        len([line for line in report.statements if line.startswith("Run-up run_up: Highest transmission error")]) == 1
     )
 
 
