@@ -68,7 +68,7 @@ def report(
     check_allow_dir(allow_dir)
     folder = _results_of(folder)
     if not folder.is_dir():
-        raise BadInputError(f"{folder}: no such folder; specify the results folder of `exugear run`")
+        raise BadInputError(f"{folder}: no such folder; specify the results folder of exugear run")
     if not changes.levers and (changes.resonance is not None or changes.loads):
         raise BadInputError("--resonance and --load are for design changes: add --levers")
     for load in changes.loads:  # before long work

@@ -89,7 +89,7 @@ def _check_resonances(group: RunGroup) -> list[Finding]:
         found = _fraction(steady, count, passed)
         verdicts.append(check_finding(passed, f"{found} are found with all window lengths"))
     if group.runs[group.main].modes is None and not group.responses:
-        return [*verdicts, Finding("warning", "no modes computed; run `exugear modes` for mode shapes")]
+        return [*verdicts, Finding("warning", "no modes computed; run exugear modes for mode shapes")]
     matched = sum(bool(own.finding.mode_name) for own in loudest)
     passed = matched >= MATCHED * count
     return [*verdicts, check_finding(passed, f"{_fraction(matched, count, passed)} are at the frequency of a mode")]

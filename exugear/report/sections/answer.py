@@ -213,9 +213,9 @@ def _quantity(material: ReportData, headline: Headline, top: Resonance, name: st
 def _note(material: ReportData, headline: Headline) -> str:
     """Say what the amplitudes are of."""
     if headline.group is None:
-        return "Estimate: amplification of the mode times static transmission error; `exugear steady` computes more."
+        return "Estimate: amplification of the mode times static transmission error; exugear steady computes more."
     if headline.response is None:
-        return "Amplitudes in the run-up; `exugear steady` adds bearing forces and accelerations at constant speed."
+        return "Amplitudes in the run-up; exugear steady adds bearing forces and accelerations at constant speed."
     band = material.context.gearbox.case.damping.modal_band_percent
     damping = "half to twice the value used" if band is None else f"{band[0]:g} to {band[1]:g} % of critical"
     decides = QUANTITIES[headline.ranking.quantity].column
@@ -246,7 +246,7 @@ def _strips(
 def _resonance_box(material: ReportData, headline: Headline, mode: MatchedMode | None) -> Box:
     modes = headline.modes
     if mode is None or modes is None:
-        return Box("No modes computed; run `exugear modes`." if modes is None else "No mode near its frequency.")
+        return Box("No modes computed; run exugear modes." if modes is None else "No mode near its frequency.")
     words = material.words
     moving = {f"{body} {motion}": share for (body, motion), share in words.kinetic_energy(modes, mode.index).items()}
     assembly = material.context.assembled(headline.choice)

@@ -86,11 +86,11 @@ def test_words_say_that_figures_are_of_constant_speed_and_name_the_mode_without_
         "Source: constant speed, time-varying stiffness",
         "On bearings, inertia set disc, constant speed, time-varying stiffness",
         "Radial forces on bearings, constant speed, time-varying stiffness",
-        "No run-up; run `exugear run`",
+        "No run-up; run exugear run",
         "energy balance closed to",
     ):
         assert words in page, words
-    assert "no modes computed; run `exugear modes` for mode shapes" not in page
+    assert "no modes computed; run exugear modes for mode shapes" not in page
     assert "window-dependent" not in page.partition('id="trust"')[0]
 
 
