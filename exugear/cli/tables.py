@@ -220,11 +220,10 @@ def print_table(table: Table) -> None:
         print_text(legend)
 
 
-def print_text(text: str, indent: str = "") -> None:
-    """Print sentences, wrapped; lines after the first are indented."""
-    limit = max(NARROWEST, results.width - 1) - len(indent)
-    lines = wrapped(plain(text), limit)
-    results.print(Text(f"\n{indent}".join(lines)), soft_wrap=True)
+def print_text(text: str) -> None:
+    """Print sentences, wrapped."""
+    lines = wrapped(plain(text), max(NARROWEST, results.width - 1))
+    results.print(Text("\n".join(lines)), soft_wrap=True)
 
 
 def significant(value: float, digits: int = 4, decimals: int = 3) -> str:
