@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -101,17 +102,23 @@ MESHES = (
 def _verdict(rows: Sequence[Mapping[str, Any]]) -> str:
     """Return the highest contact stress and the shortest life of all bearings."""
     hardest = max(rows, key=lambda own: own["contact_pressure_MPa"])
-    text = f"Contact stress up to {hardest['contact_pressure_MPa']:.0f} MPa ({hardest['bearing']})"
-    rated = [own for own in rows if own["L10r_Mrev"] is not None]
-    if rated:
-        shortest = min(rated, key=lambda own: own["L10r_Mrev"])
-        text += f", L10r from {life_text(shortest['L10r_Mrev'])}·10⁶ rev ({shortest['bearing']})"
-    return text
+    shortest = min(rows, key=_life)
+    stress = f"contact stress up to {hardest['contact_pressure_MPa']:.0f} MPa"
+    if shortest["L10r_Mrev"] is None:
+        return f"{hardest['bearing']}: {stress}"
+    life = f"L10r from {life_text(shortest['L10r_Mrev'])}·10⁶ rev"
+    if hardest is shortest:
+        return f"{hardest['bearing']}: {stress}, {life}"
+    return f"{stress[0].upper()}{stress[1:]} ({hardest['bearing']}), {life} ({shortest['bearing']})"
+
+
+def _life(bearing: Mapping[str, Any]) -> float:
+    return math.inf if bearing["L10r_Mrev"] is None else float(bearing["L10r_Mrev"])
 
 
 def bearing_tables(summary: Mapping[str, Any]) -> list[Table]:
     """Return the tables of all bearings and meshes."""
-    rows = summary["bearings"]
+    rows = sorted(summary["bearings"], key=_life)
     title = f"Bearings under the static load, variant {summary['variant']}"
     details = DETAILS
     details += ESTIMATED if any(bearing["ratings_estimated"] for bearing in rows) else ""

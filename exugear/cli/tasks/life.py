@@ -150,7 +150,7 @@ def _verdict(found: Mapping[str, Any], years: float, hours: float) -> str:
     parts = _parts(found)
     worst = f": damage {PARTS[2].cell(parts[0])}, {parts[0]['part']}, {parts[0]['mode']}" if parts else ""
     reached = "not reached" if found["failures"] or found["shortfalls"] else "reached"
-    return f"Life of {years:g} years, {hours:.0f} h, {reached}{worst}"
+    return f"Life of {years:g} years, {hours:,.0f} h, {reached}{worst}"
 
 
 def life_tables(found: Mapping[str, Any]) -> list[Table]:

@@ -45,7 +45,7 @@ def _verdict(summary: Mapping[str, Any]) -> str:
     largest = max(source["largest_torque_kN_m"] for source in summary["sources"])
     return (
         f"Torque on {summary['body']}: equivalent {_three(torque)} kN m (m = {exponent}), largest "
-        f"{_three(largest)} kN m, {summary['hours']:.0f} h"
+        f"{_three(largest)} kN m, {summary['hours']:,.0f} h"
     )
 
 
@@ -81,7 +81,7 @@ def load_tables(summary: Mapping[str, Any], bins: int) -> list[Table]:
     ranges = [{"exponent": m, "range": value} for m, value in summary["equivalent_range_1_Hz_kN_m"].items()]
     legend = (
         f"Torque: constant torque over the same {summary['revolutions']:.3g} revolutions with the same damage; range: "
-        f"one cycle per second. {bins} bin{'s' * (bins != 1)}, {summary['hours']:.0f} h."
+        f"one cycle per second. {bins} bin{'s' * (bins != 1)}, {summary['hours']:,.0f} h."
     )
     hub = [
         {"load": re.sub("_kN(_m)?$", "", name).replace("_", " "), **by_exponent}

@@ -9,7 +9,6 @@ import numpy as np
 import xarray as xr
 
 from exugear.cli.console import BadInputError, FailedError, warn
-from exugear.cli.resonances import resonance_table
 from exugear.cli.tables import Outcome
 from exugear.cli.watched import WatchedProject
 from exugear.gearbox.choice import Choice
@@ -65,7 +64,6 @@ def view(
             raise BadInputError(f"--resonance {resonance}: no steady-state response; run: {command}")
         modes = project.modes()
         headline = None
-        tables = []
         about = f"Vibration at resonances in operation needs a steady-state response: {command}"
     else:
         ranking = ranking_of(response, wanted=quantity or project.gearbox.case.report.quantity)
@@ -74,7 +72,6 @@ def view(
             raise BadInputError(f"--resonance {resonance}: the ranking has {count} resonances; choose one or omit it")
         modes = project.modes()
         headline = Headline(assembly.choice, "", "", ranking, None, response, modes.to_dataset())
-        tables = [resonance_table(project.gearbox, ranking, str(assembly.choice.variant))]
         about = ""
     wanted = project.gearbox.case.report.reference_frequency_Hz if near is None else near
     first = int(modes.overall.argmax()) if wanted is None else modes.nearest(wanted)
@@ -82,10 +79,9 @@ def view(
     shown = {"mode": first + 1} if resonance is None else {"resonance": resonance}
     page, *pictures = written
     Outcome(
-        verdict=f"Page of {len(modes.frequency)} modes" + (" and the resonances in operation" if tables else ""),
+        verdict=f"Page of {len(modes.frequency)} modes" + ("" if about else " and the resonances in operation"),
         summary={"case": project.gearbox.source, **shown, "files": [str(file) for file in written]},
-        tables=tables,
-        findings=[] if tables else [Finding("note", about)],
+        findings=[Finding("note", about)] if about else [],
         path=", ".join([str(page), *(picture.name for picture in pictures)]),
     ).show(as_json, whole)
 
