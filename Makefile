@@ -55,9 +55,9 @@ define dynamics
 		$(EXUGEAR) run $(CASE) --variant $$variant --inertias $$1 --out $(1) $(3) $$compared || return; \
 	done; \
 	for variant in rigid bushing; do \
-		$(EXUGEAR) modes $(CASE) --variant $$variant --inertias $$1 --out $(1) >$(1)/modes-$$variant-$$1.txt || return; \
+		$(EXUGEAR) modes $(CASE) --variant $$variant --inertias $$1 --out $(1) --all >$(1)/modes-$$variant-$$1.txt || return; \
 	done; \
-	$(EXUGEAR) steady $(CASE) --variant bushing --inertias $$1 --out $(1) >$(1)/steady-bushing-$$1.txt || return; \
+	$(EXUGEAR) steady $(CASE) --variant bushing --inertias $$1 --out $(1) --all >$(1)/steady-bushing-$$1.txt || return; \
 }; \
 others=; \
 for inertias in $(wordlist 2,9,$(2)); do of_set $$inertias >$(1)/run-$$inertias.log 2>&1 & others="$$others $$!"; done; \

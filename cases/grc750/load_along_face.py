@@ -40,7 +40,7 @@ def main() -> None:
         "flexible": project,
     }
     for name, chosen in projects.items():
-        print(f"{name}: mesh, opening over the face in um, highest over mean line load")
+        print(f"{name}: mesh, opening over the face in µm, highest over mean line load")
         for mesh, opening, factor in loads_of_meshes(chosen, compliance):
             print(f"  {mesh:15s} {1e6 * opening:6.1f}  {factor:5.2f}", flush=True)
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
+
+from arguments import results_folder
 
 from exugear import Choice, Project, order_lines, plot_campbell, plot_waterfalls, run_waterfall
 from exugear.results.spectra.resonances import (
@@ -36,7 +37,7 @@ def compute(variant: str) -> None:
 
 def grc_project(choice: Choice) -> Project:
     """Take up the GRC with the results folder that the command line names, results/grc750 without one."""
-    return Project.from_toml(CASE, sys.argv[1] if len(sys.argv) > 1 else None, choice)
+    return Project.from_toml(CASE, results_folder("results/grc750"), choice)
 
 
 def show(progress: Progress) -> None:

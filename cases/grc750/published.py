@@ -6,8 +6,9 @@ and at 3.2 kHz 4 %.
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
+
+from arguments import results_folder
 
 from exugear import Choice, Gearbox, Project
 
@@ -19,4 +20,4 @@ DAMPING = {"bearing_time_s": 4e-6, "mesh_time_s": 4e-6, "coupling_time_s": 4e-6,
 def published_project(choice: Choice) -> Project:
     """Take up the GRC with the results folder that the command line names, results/grc750-published without one."""
     gearbox = Gearbox.from_toml(CASE).varied({"damping": DAMPING})
-    return Project(gearbox, Path(sys.argv[1] if len(sys.argv) > 1 else "results/grc750-published"), choice)
+    return Project(gearbox, results_folder("results/grc750-published"), choice)

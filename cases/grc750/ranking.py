@@ -37,7 +37,7 @@ def main() -> None:
     for variant in ("rigid", "bushing"):
         rows = compared(variant)
         print(f"\n{variant}: loudest peaks at steady speed, and in the run-up")
-        print("| rank | in the run-up | order | rpm | Hz | damping % | steady um | run-up um | dB | severity |")
+        print("| rank | in the run-up | order | rpm | Hz | damping % | steady µm | run-up µm | dB | severity |")
         for rank, own in enumerate(rows, start=1):
             damping = "" if own.damping is None else f"{100.0 * own.damping:.2f}"
             severity = "" if own.severity is None else f"{own.severity:.2g}"

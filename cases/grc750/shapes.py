@@ -10,7 +10,6 @@ from scripts.
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 from exugear import Gearbox, SolidModel
@@ -65,4 +64,6 @@ def main(out: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path("results/grc750/bodies"))
+    from arguments import results_folder
+
+    main(results_folder("results/grc750/bodies"))

@@ -10,7 +10,6 @@ tables. Results go to results/grc750-routes by default. The whole takes less tha
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Literal
 
@@ -46,4 +45,6 @@ def difference(first: xr.DataArray, second: xr.DataArray) -> float:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path("results/grc750-routes"))
+    from arguments import results_folder
+
+    main(results_folder("results/grc750-routes"))

@@ -62,7 +62,7 @@ def open_project(
 ) -> WatchedProject:
     """Read a gearbox file and raise an error for invalid or unavailable model settings; write no files.
 
-    Without a variant, the usual one of the gearbox is chosen and printed.
+    Without a variant, the usual one of the gearbox is chosen.
     """
     gearbox = read_gearbox(case, allow_dir, scripts)
     choice = Choice(variant or _chosen_variant(gearbox), str(mesh_model), inertias, load_case)
@@ -73,11 +73,10 @@ def open_project(
 
 
 def _chosen_variant(gearbox: Gearbox) -> Variant:
-    """Return the usual variant of a gearbox, and print which one it is."""
+    """Return the usual variant of a gearbox, and print which one it is if bearings are not available."""
     variant = usual_variant(gearbox)
-    reason = lacking(gearbox, Variant.bushing)
-    why = f"bushing is not available, {reason}" if reason else "select another with --variant"
-    note(f"Variant {variant} ({VARIANT_DESCRIPTIONS[variant]}): {why}")
+    if reason := lacking(gearbox, Variant.bushing):
+        note(f"Variant {variant} ({VARIANT_DESCRIPTIONS[variant]}): bushing is not available, {reason}")
     return variant
 
 

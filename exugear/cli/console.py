@@ -113,7 +113,7 @@ def warn(message: str) -> None:
     note(f"Warning: {message}", style="yellow")
 
 
-def counted(lines: list[str]) -> list[str]:
+def counted(lines: list[str], most: int = MOST_LINES) -> list[str]:
     """Return the lines to print: all, or the first ones and a last line with the number of the others.
 
     Examples
@@ -122,9 +122,9 @@ def counted(lines: list[str]) -> list[str]:
     >>> len(shown), shown[-1]
     (25, 'and 26 more')
     """
-    if len(lines) <= MOST_LINES:
+    if len(lines) <= most:
         return lines
-    return [*lines[: MOST_LINES - 1], f"and {len(lines) - MOST_LINES + 1} more"]
+    return [*lines[: most - 1], f"and {len(lines) - most + 1} more"]
 
 
 class _Description(ProgressColumn):
@@ -144,15 +144,26 @@ class _Times(ProgressColumn):
         return Text(text)
 
 
+class _Transient(Progress):
+    """Progress display that leaves nothing behind, not even an empty line where the output is no terminal."""
+
+    def stop(self) -> None:
+        self.live.stop()
+
+
 def progress_bar() -> Progress:
-    """Return a progress bar with the remaining time, to be used as a context manager: one line in 80 columns."""
+    """Return a progress bar with the remaining time, to be used as a context manager: one line in 80 columns.
+
+    It disappears at its end.
+    """
     bar, share, times = (Column(no_wrap=True) for _ in range(3))
-    return Progress(
+    return _Transient(
         _Description(),
         BarColumn(14, table_column=bar),
         TaskProgressColumn(table_column=share),
         _Times(table_column=times),
         console=messages,
+        transient=True,
         speed_estimate_period=3600.0,  # work proceeds in bursts, so that only the whole of it indicates the speed
     )
 
@@ -320,13 +331,14 @@ def _user_error(error: Exception) -> Exception | None:
     return None
 
 
-def refuse_not_converged(meshes: Sequence[str]) -> None:
-    """End with code 1 if meshes interpolate their tables next to non-converged states."""
-    if meshes:
-        raise FailedError(
-            f"invalid: the static state of {', '.join(meshes)} lies next to non-converged table states, values are "
-            "interpolated; `exugear ste` lists the states and reasons"
-        )
+def not_converged_failure(meshes: Sequence[str]) -> str:
+    """Return why results are invalid if meshes interpolate their tables next to non-converged states; empty if none."""
+    if not meshes:
+        return ""
+    return (
+        f"invalid: the static state of {', '.join(meshes)} lies next to non-converged table states, values are "
+        "interpolated; exugear ste lists the states and reasons"
+    )
 
 
 # Results folders, which commands check before they start

@@ -13,6 +13,7 @@ from exugear.system.tooth_mesh.laws.registry import LAWS
 
 CaseArgument = Annotated[Path, typer.Argument(metavar="GEARBOX.toml", help="Gearbox file.", show_default=False)]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print a summary as a JSON object.")]
+AllOption = Annotated[bool, typer.Option("--all", help="Print all tables, rows and notes.")]
 OutOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Results folder. (default: results/NAME)")]
 
 

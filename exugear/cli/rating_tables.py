@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from functools import partial
 
-from exugear.cli.console import note
-from exugear.cli.tables import Column, print_table, print_text, wrapped
+from exugear.cli.tables import Column, Outcome, Table, failure_text, wrapped
 from exugear.life.rating.sheet import FINITE_ELEMENTS, UNITS, FlankSheet, RatingSheet, sheet_value
+from exugear.results.findings import Finding
 
 _BLOCKS: Mapping[str, tuple[str, ...]] = {
     "load": ("torque", "load_torque", "F_t", "v", "N_L", "K_A", "K_gamma", "K_v", "F_betax", "K_Hbeta", "K_Halpha"),
@@ -35,18 +36,53 @@ _DIGITS = {
 }
 
 
-def print_rating(sheet: RatingSheet) -> None:
-    """Print a rating sheet with its assumptions and neglected effects."""
-    print_text(f"Rating to {sheet.edition}, method B; {sheet.load}")
-    for title, flanks in _meshes(sheet):
-        columns = [Column("factor", _factor), *map(_column, flanks)]
-        print_table(f"Mesh {title}", _rows(flanks, sheet.other_edition), columns)
-        for line in dict.fromkeys(line for flank in flanks for line in _remarks(flank)):
-            note(line, style="yellow")
-    for line in sheet.assumptions:
-        note(line)
-    for line in sheet.left_out:
-        note(line, style="yellow")
+def _value(symbol: str, flank: FlankSheet) -> float:
+    return sheet_value(symbol, flank.standard.get(symbol, math.nan))
+
+
+FLANK_LEGEND = "S_H, S_F: safety against pitting and tooth breakage, with load factors."
+FLANKS = (
+    Column("gear", lambda flank: f"{flank.gear} {flank.flank}"),
+    Column("mesh", lambda flank: flank.family + " reversed" * (flank.sense < 0), is_text=True),
+    *(
+        Column(heading, partial(_value, symbol), form)
+        for heading, symbol, form in (
+            ("σ_H\nMPa", "sigma_H", ".0f"),
+            ("S_H", "S_H", ".2f"),
+            ("σ_F\nMPa", "sigma_F", ".0f"),
+            ("S_F", "S_F", ".2f"),
+            ("K_Hβ", "K_Hbeta", ".2f"),
+        )
+    ),
+)
+
+
+def rating_outcome(sheet: RatingSheet, case: str, name: str) -> Outcome:
+    """Return safety factors of all flanks, all factors by mesh, assumptions and neglected effects."""
+    flanks = sorted(sheet.flanks, key=lambda flank: _value("S_H", flank))
+    title = f"{sheet.edition}, method B; {sheet.load}"
+    smallest = ", ".join(_smallest(flanks, symbol) for symbol in ("S_H", "S_F") if flanks)
+    remarks = dict.fromkeys(line for flank in sheet.flanks for line in _remarks(flank))
+    factors = [
+        Table(f"Mesh {mesh}", [*_rows(own, sheet.other_edition)], [Column("factor", _factor), *map(_column, own)])
+        for mesh, own in _meshes(sheet)
+    ]
+    return Outcome(
+        verdict=f"Smallest {smallest}" if flanks else "No loaded flanks",
+        summary={"case": case, "name": name, "rating": sheet.summary()},
+        tables=[Table(title, flanks, FLANKS, FLANK_LEGEND, noun="flanks"), *factors],
+        findings=[
+            *(Finding("warning", line) for line in remarks),
+            *(Finding("note", line) for line in (*sheet.assumptions, *sheet.left_out)),
+        ],
+        failure=failure_text("safety factors below the required minimum:", sheet.shortfalls),
+    )
+
+
+def _smallest(flanks: list[FlankSheet], symbol: str) -> str:
+    """Return the smallest safety factor of all flanks, and the gear that has it."""
+    least = min(flanks, key=lambda flank: _value(symbol, flank))
+    return f"{symbol} {_value(symbol, least):.2f} ({least.gear} {least.flank}, {least.family})"
 
 
 def _meshes(sheet: RatingSheet) -> Iterator[tuple[str, list[FlankSheet]]]:
@@ -73,7 +109,7 @@ def _rows(flanks: list[FlankSheet], other_edition: str) -> Iterator[tuple[str, s
 
 def _factor(row: tuple[str, str, str]) -> str:
     words, name, _ = row
-    return ", ".join(filter(None, (words, UNITS.get(name, ""))))
+    return ", ".join(filter(None, (words, UNITS.get(name, "").replace("um", "µm"))))
 
 
 def _column(flank: FlankSheet) -> Column:

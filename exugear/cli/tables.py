@@ -1,17 +1,24 @@
-"""Tables on the console: complete numbers and headings in 79 columns; only names and texts are wrapped."""
+"""Outcomes on the console: a verdict, at most one table, warnings, path of the results; ``--all`` prints the rest.
+
+Tables have complete numbers and headings in 79 columns; only names and texts are wrapped.
+"""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
 from typing import Any, Self
 
 from rich.cells import cell_len, set_cell_size
 from rich.text import Text
 
-from exugear.cli.console import plain, results
+from exugear.cli.console import EXIT_FAILED, counted, note, plain, print_json, results, say
+from exugear.results.findings import Finding
 from fe_ste.tools.display import without_round_off
 
 NARROWEST = 79
@@ -21,6 +28,10 @@ INFINITE = "infinite"
 """Text of infinite numbers in summaries, since JSON has none."""
 HARD_SPACE = "\u00a0"
 """Space in texts at which lines are broken only if necessary; it is printed as a space."""
+SHOWN_ROWS = 10
+"""Maximum number of rows of a table without ``--all``."""
+SHOWN_WARNINGS = 5
+"""Maximum number of warnings without ``--all``."""
 SMALLEST_NAME = 10
 """Minimum width of wrapped names and texts; a table without space for it is printed in parts below each other."""
 
@@ -40,6 +51,8 @@ class Column:
     """Text of an unknown value."""
     is_text: bool = False
     """Whether cells are text that may be wrapped."""
+    is_detail: bool = False
+    """Whether the column is printed with ``--all`` only."""
 
     def cell(self, summary: Any) -> str:
         """Return the text of one summary."""
@@ -56,6 +69,10 @@ class Column:
             value = without_round_off(value)
         text = format(value, self.form)
         return text.removeprefix("-") if not text.strip("-0.") else text
+
+
+detail = partial(Column, is_detail=True)
+"""Column that is printed with ``--all`` only."""
 
 
 @dataclass(frozen=True)
@@ -85,29 +102,128 @@ class _Cells:
         return max(_width(self.heading), min(self.natural, SMALLEST_NAME))
 
 
-def print_table(title: str, summaries: Iterable[Any], columns: Sequence[Column], legend: str = "") -> None:
-    """Print a table with one row for each summary, and a legend below it.
+@dataclass(frozen=True)
+class Table:
+    """A table with one row for each summary."""
 
-    The first column is text; numbers are never wrapped or truncated.
+    title: str
+    rows: Sequence[Any]
+    columns: Sequence[Column]
+    """The first one is text; numbers are never wrapped or truncated."""
+    legend: str = ""
+    """Text below the table."""
+    details: str = ""
+    """Continuation of the legend with ``--all``."""
+    noun: str = "rows"
+    """Name of the rows, plural."""
+
+    @property
+    def excerpt(self) -> Table:
+        """First rows, without the columns that are details."""
+        columns = [column for column in self.columns if not column.is_detail]
+        return replace(self, rows=self.rows[:SHOWN_ROWS], columns=columns, details="")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a command prints at its end."""
+
+    verdict: str
+    """Result in one line."""
+    summary: Mapping[str, Any]
+    """All results, for ``--json``."""
+    tables: Sequence[Table] = ()
+    """The first one is an excerpt without ``--all``, the others are omitted."""
+    findings: Sequence[Finding] = ()
+    path: str | Path = ""
+    """File or folder of the results; empty if nothing was written."""
+    failure: str = ""
+    """Why the command failed, if its results are invalid or do not meet a requirement."""
+    remarks: Sequence[str] = ()
+    """Sentences below the tables, printed with ``--all`` only."""
+
+    def show(self, as_json: bool, whole: bool) -> None:
+        """Print the outcome, and end with code 1 if it is a failure."""
+        if as_json:
+            print_json({**self.summary, "findings": [asdict(finding) for finding in self.findings]})
+        else:
+            self._print(whole)
+        warnings = [finding.line for finding in self.findings if finding.level == "warning"]
+        for line in warnings if whole else counted(warnings, SHOWN_WARNINGS):
+            note(line, style="yellow")
+        failures = [self.failure, *(finding.text for finding in self.findings if finding.level == "error")]
+        failure = "; ".join(filter(None, failures))
+        if failure:
+            note(f"Failed: {failure}", style="red")
+        if self.path and not as_json:
+            say(f"Results: {self.path}")
+        elif self.path and failure:
+            note(f"Results: {self.path}")
+        if failure:
+            sys.exit(EXIT_FAILED)
+
+    def _print(self, whole: bool) -> None:
+        """Print verdict and tables; without ``--all``, say what is left out."""
+        print_text(self.verdict)
+        tables = [table for table in self.tables if table.rows]
+        for table in tables if whole else [table.excerpt for table in tables[:1]]:
+            print_table(table)
+        if whole:
+            for line in (*self.remarks, *(finding.text for finding in self.findings if finding.passed)):
+                print_text(line)
+        elif tables:
+            first, columns = tables[0], sum(column.is_detail for column in tables[0].columns)
+            left = {first.noun: len(first.rows) - SHOWN_ROWS, "columns": columns, "tables": len(tables) - 1}
+            more = [f"{count} more {noun if count > 1 else noun[:-1]}" for noun, count in left.items() if count > 0]
+            if more:
+                print_text(f"{', '.join(more)}: --all")
+
+
+def failure_text(what: str, reasons: Sequence[str]) -> str:
+    """Return what failed with its reasons, a line each; empty without any."""
+    return "\n".join([what, *reasons]) if reasons else ""
+
+
+def bearing_findings(remarks: Mapping[str, Sequence[str]]) -> list[Finding]:
+    """Return one finding for each remark, with the bearings that it is on; where ratings are from is a note.
+
+    Examples
+    --------
+    >>> bearing_findings({"left": ["low load"], "right": ["low load"]})
+    [Finding(level='warning', text='bearings left, right: low load', value=None)]
     """
+    found: dict[str, list[str]] = {}
+    for bearing, own in remarks.items():
+        for remark in own:
+            found.setdefault(remark, []).append(bearing)
+    return [
+        Finding(
+            "note" if remark.startswith("ratings") else "warning",
+            f"bearing{'s' * (len(names) > 1)} {', '.join(names)}: {remark}",
+        )
+        for remark, names in found.items()
+    ]
+
+
+def print_table(table: Table) -> None:
+    """Print a table, and its legend below it."""
     limit = max(NARROWEST, results.width - 1)
-    results.print(Text("\n".join(["", *wrapped(plain(title), limit)]), style="bold"), soft_wrap=True)
-    rows = [*summaries]
-    printed = [_Cells.of(column, rows, column.is_text or column is columns[0]) for column in columns]
+    results.print(Text("\n".join(["", *wrapped(plain(table.title), limit)]), style="bold"), soft_wrap=True)
+    columns = table.columns
+    printed = [_Cells.of(column, table.rows, column.is_text or column is columns[0]) for column in columns]
     for number, part in enumerate(_parts(printed, limit)):
         if number:
             results.print()
         for line in _lines(part, _widths(part, limit)):
             results.print(Text(line), soft_wrap=True)
-    if legend:
+    if legend := " ".join(filter(None, (table.legend, table.details))):
         print_text(legend)
 
 
-def print_text(text: str, indent: str = "") -> None:
-    """Print sentences, wrapped; lines after the first are indented."""
-    limit = max(NARROWEST, results.width - 1) - len(indent)
-    lines = wrapped(plain(text), limit)
-    results.print(Text(f"\n{indent}".join(lines)), soft_wrap=True)
+def print_text(text: str) -> None:
+    """Print sentences, wrapped."""
+    lines = wrapped(plain(text), max(NARROWEST, results.width - 1))
+    results.print(Text("\n".join(lines)), soft_wrap=True)
 
 
 def significant(value: float, digits: int = 4, decimals: int = 3) -> str:

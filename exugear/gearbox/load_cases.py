@@ -357,6 +357,42 @@ def band_warning(loads: LoadSummary, band: float) -> str:
     )
 
 
+def load_case_warnings(
+    gearbox: Gearbox,
+    case: LoadCase,
+    band: float,
+    variant: str,
+    inertias: str | None = None,
+    duration: float | None = None,
+    *,
+    uses_single_load: bool = True,
+) -> tuple[str, ...]:
+    """Return all warnings about a run of a load case: torques, bearings, tables, stored band, friction.
+
+    Parameters
+    ----------
+    band : highest stored frequency, Hz
+    variant, inertias, duration : of the run; the last two default to those of the file
+    uses_single_load : whether the mesh model evaluates tables at the static load only
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> load_case_warnings(gearbox, gearbox.load_cases["reference"], 6400.0, "bushing")
+    ()
+    """
+    loads = summarise_loads(gearbox, case, inertias, duration)
+    found = (
+        *load_warnings(loads),
+        missing_torque_warning(gearbox, case),
+        bearing_range_warning(gearbox, loads, variant),
+        other_load_warning(gearbox, loads, uses_single_load),
+        band_warning(loads, band),
+        friction_warning(gearbox, loads),
+    )
+    return tuple(filter(None, found))
+
+
 def load_in_words(case: LoadCase) -> str:
     """Return the torques of a load case and the driven body as text.
 

@@ -85,7 +85,7 @@ def renamed_hint(path: Sequence[str], renames: Sequence[Rename]) -> str:
     new = new_name(path, renames)
     if new is None:
         return ""
-    return f"was renamed to {new}; `exugear migrate FILE.toml` rewrites the file"
+    return f"was renamed to {new}; exugear migrate FILE.toml rewrites the file"
 
 
 class MigrationError(ValueError):

@@ -240,6 +240,25 @@ class Train(
         """Speed ratio output / input."""
         return self.rolling_speeds(self.input, 1.0)[self.output]
 
+    @property
+    def ratio_text(self) -> str:
+        """Transmission ratio as text, the faster end over the slower one.
+
+        Examples
+        --------
+        >>> from exugear import Gearbox
+        >>> Gearbox.from_toml("cases/grc750/gearbox.toml").train.ratio_text
+        '81.5 : 1, speed-increasing'
+        """
+        ratio = abs(self.ratio)
+        if not ratio:
+            return "output locked"
+        faster = max(ratio, 1.0 / ratio)
+        text = f"{faster:.{1 if 10.0 <= faster < 1000.0 else 2 if faster < 10.0 else 0}f} : 1"
+        if faster > 1.0:
+            text += ", speed-increasing" if ratio > 1.0 else ", speed-reducing"
+        return text + (", opposite rotation" if self.ratio < 0.0 else "")
+
     @cached_property
     def independent(self) -> tuple[str, ...]:
         """Bodies whose speeds determine all others: the input, and those that are stationary if only it rotates."""

@@ -99,7 +99,7 @@ def factors_of_run(assembly: Assembly, rating: RatingSection, path: Path, body: 
         arrays, attributes = read_run(path, ["time", "input_speed", "mesh_force"])
     except FileError as error:
         command = f"exugear run GEARBOX.toml --variant {assembly.variant} --load-case {rating.dynamic_factor_run}"
-        raise gearbox.error(f"{key}: {error}; compute it by `{command}`") from error
+        raise gearbox.error(f"{key}: {error}; compute it by {command}") from error
     if attributes["input_hash"] != input_hash(assembly, rating.dynamic_factor_run):
         raise gearbox.error(f"{key}: {path} belongs to another input; run it again")
     ratio = abs(gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)[body])
@@ -226,7 +226,7 @@ def factors_of_response(assembly: Assembly, rating: RatingSection, path: Path, b
         fits = settings_of(data.attrs).hash_with(assembly) == data.attrs["input_hash"]
     except (FileError, ValueError) as error:
         command = f"exugear steady GEARBOX.toml --variant {assembly.variant} --method {level}"
-        raise gearbox.error(f"{key}: {error}; compute it by `{command}`") from error
+        raise gearbox.error(f"{key}: {error}; compute it by {command}") from error
     if not fits:
         raise gearbox.error(f"{key}: {path} belongs to another input; recompute it")
     frequencies = gearbox.train.mesh_frequencies(2.0 * np.pi)

@@ -27,7 +27,7 @@ from exugear.report.findings.context import (
     with_responses,
 )
 from exugear.report.findings.groups import groups_of
-from exugear.report.findings.headline import headline_of
+from exugear.report.findings.headline import Headline, headline_of
 from exugear.report.findings.other_design import read_other_design
 from exugear.report.findings.parameter_variations import begin_variations, model_variations
 from exugear.report.findings.ratings import ratings_of
@@ -47,6 +47,7 @@ from exugear.report.sections.steady import steady_section
 from exugear.report.sections.trust import trust_section
 from exugear.report.web.document import ArrayStore, whole_page
 from exugear.report.web.html import render
+from exugear.results.findings import Finding
 from exugear.results.folder import REPORT_FILE, read_stored_gearbox
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.files import write_file
@@ -99,7 +100,7 @@ def _scope(material: ReportData) -> str:
     gearbox = material.context.gearbox
     rated = gearbox.case.operation.rated_speed_rpm
     parts = [] if rated is None else [f"rated {rated:g} rpm"]
-    parts += [material.words.labelled(static_load_in_words(gearbox)), f"speed ratio {gearbox.train.ratio:.4g}"]
+    parts += [material.words.labelled(static_load_in_words(gearbox)), gearbox.train.ratio_text]
     if material.headline is not None:
         parts += [Variant.of(material.headline.choice.variant).label, material.headline.source]
     text = ", ".join(parts)
@@ -149,6 +150,12 @@ class Report:
     """Results that are not in the folder, each with the command that computes it."""
     left_out: tuple[str, ...]
     """Skipped files that do not belong to the gearbox file, and results that could not be computed, with the reason."""
+    gearbox: Gearbox
+    """Gearbox of the results."""
+    headline: Headline | None = None
+    """Ranking of the page; None if nothing is ranked."""
+    findings: tuple[Finding, ...] = ()
+    """Checks of the results that the ranking is from."""
 
 
 def write_report(
@@ -214,7 +221,17 @@ def write_report(
     write_file(path, page.encode("utf-8", "replace"))
     ranked = () if material.headline is None else material.headline.ranking.resonances
     resonances = tuple(resonance.summary() for resonance in ranked)
-    return Report(path, tuple(context.notes.statements), resonances, missing, tuple(context.notes.left_out))
+    notes = context.notes
+    return Report(
+        path,
+        tuple(notes.statements),
+        resonances,
+        missing,
+        tuple(notes.left_out),
+        gearbox,
+        material.headline,
+        tuple(notes.findings),
+    )
 
 
 def _material(context: Context, executor: Executor | None) -> ReportData:

@@ -58,7 +58,7 @@ def read_stored_gearbox(folder: Path, permissions: Permissions = NOTHING_MORE) -
     path = folder / CASE_FILE
     if not path.is_file():
         raise GearboxFileError(
-            f"{folder}: contains no results (no {CASE_FILE}); specify the results folder of `exugear run`"
+            f"{folder}: contains no results (no {CASE_FILE}); specify the results folder of exugear run"
         )
     try:
         kept = parsed(lambda: json.loads(read_text(path)), str(path), "JSON")
@@ -72,9 +72,7 @@ def read_stored_gearbox(folder: Path, permissions: Permissions = NOTHING_MORE) -
         source = kept["source"]
     # A file with a valid checksum may still be forged and have any content.
     except (FileError, ValueError, KeyError, TypeError, RecursionError) as error:
-        raise GearboxFileError(
-            f"{path}: cannot be used ({error}); run `exugear modes` into this folder again"
-        ) from error
+        raise GearboxFileError(f"{path}: cannot be used ({error}); run exugear modes into this folder again") from error
     return Gearbox.from_dict(content, source, permissions)
 
 
@@ -293,8 +291,8 @@ def read_duties(path: Path) -> dict[str, Any]:
         if content["method_version"] == MODES and isinstance(content["bearings"], list):
             return dict(content)
     except (ValueError, KeyError, TypeError):
-        raise FileError(f"{path}: is damaged; run `exugear bearings` again") from None
-    raise FileError(f"{path}: was written by another version; run `exugear bearings` again")
+        raise FileError(f"{path}: is damaged; run exugear bearings again") from None
+    raise FileError(f"{path}: was written by another version; run exugear bearings again")
 
 
 def _finite(value: float) -> float | None:

@@ -107,7 +107,7 @@ def usual_speeds(gearbox: Gearbox) -> SpeedRange:
             break
     if fastest == 0.0:
         raise SteadyError(
-            "speeds: no load case rotates the train, and [operation] has no speed; use --speeds, such as 0:215:400 "
+            "speeds: no load case rotates the train, and [operation] has no speed; use --speeds, such as 0:215 "
             "in rpm of the input"
         )
     return SpeedRange(0.0, math.copysign(fastest, sense), USUAL_COUNT)

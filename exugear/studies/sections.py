@@ -61,7 +61,7 @@ class NormalSection(StudyPart):
     @model_validator(mode="after")
     def _order(self) -> NormalSection:
         if self.min is not None and self.max is not None and self.min >= self.max:
-            raise ValueError("`min` must be below `max`")
+            raise ValueError("min must be below max")
         return self
 
 
@@ -76,7 +76,7 @@ class UniformSection(StudyPart):
     @model_validator(mode="after")
     def _order(self) -> UniformSection:
         if self.min >= self.max:
-            raise ValueError("`min` must be below `max`")
+            raise ValueError("min must be below max")
         return self
 
 
@@ -202,9 +202,9 @@ class LimitSection(StudyPart):
     @model_validator(mode="after")
     def _order(self) -> LimitSection:
         if self.min is None and self.max is None:
-            raise ValueError("set `min`, `max` or both")
+            raise ValueError("set min, max or both")
         if self.min is not None and self.max is not None and self.min > self.max:
-            raise ValueError("`min` must not be above `max`")
+            raise ValueError("min must not be above max")
         return self
 
 

@@ -428,7 +428,7 @@ class ValidityMonitor:
         if names:
             yield (
                 f"table: {', '.join(names)} read table states next to non-converged ones (interpolated) for up to "
-                f"{times.max():.3g} s; `exugear ste` lists the states and reasons"
+                f"{times.max():.3g} s; exugear ste lists the states and reasons"
             )
 
 

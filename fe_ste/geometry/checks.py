@@ -111,7 +111,7 @@ def _small(length: float) -> str:
     """Size of an overlap: in micrometres where four decimals of a millimetre would not show it."""
     if length >= 5e-6:
         return _mm(length)
-    return f"{1e6 * length:.3g} um"
+    return f"{1e6 * length:.3g} µm"
 
 
 def _deg(angle: float) -> str:

@@ -338,8 +338,8 @@ class _EquilibriumSearch:
             point = self.model.bricks.points[self.model.first.nodes[deepest]]
             coordinates = ", ".join(f"{1e3 * value:.3f}" for value in point)
             raise EquilibriumError(
-                f"the surfaces overlap by {-1e6 * gap[deepest]:.3g} um at the start, near ({coordinates}) mm; "
-                f"at most {1e6 * self.model.allowed_overlap:.3g} um is allowed"
+                f"the surfaces overlap by {-1e6 * gap[deepest]:.3g} µm at the start, near ({coordinates}) mm; "
+                f"at most {1e6 * self.model.allowed_overlap:.3g} µm is allowed"
             )
         if not np.isfinite(gap).any():
             raise EquilibriumError("no facets of the two surfaces face each other: nothing can touch")

@@ -124,16 +124,17 @@ def without_round_off(value: float) -> float:
 
 
 def life_text(value: float) -> str:
-    """Return a rating life in three digits, at most `LONGEST_LIFE`.
+    """Return a rating life in three digits, without exponent, at most `LONGEST_LIFE`.
 
     Examples
     --------
-    >>> life_text(6417.3), life_text(1.42e57)
-    ('6.42e+03', '>1e9')
+    >>> life_text(6417.3), life_text(0.21), life_text(1.42e57)
+    ('6420', '0.21', '>1e9')
     """
     if value > LONGEST_LIFE:
         return ">1e9"
-    return f"{without_round_off(value):.3g}"
+    text = f"{without_round_off(value):.3g}"
+    return f"{float(text):.0f}" if "e+" in text else text
 
 
 def value_range(values: ArrayLike, unit: str, scale: float = 1.0) -> str:

@@ -46,9 +46,10 @@ def new(
     if as_json:
         print_json({"case": str(case), "kind": kind.value})
         return
-    say(f"{case}: {KINDS[kind.value]}. Next:")
+    say(f"{KINDS[kind.value]}. Next:")
     for line in (f"check {case}", f"run {case}", f"report {default_folder(case)}"):
         say(f"  exugear {line}")
+    say(f"Written: {case}")
 
 
 def _write(path: Path, text: str) -> None:
@@ -66,13 +67,14 @@ def import_(
     ] = None,
     shifts: options.ShiftsOption = "file",
     distances: options.DistancesOption = "agreeing",
+    whole: options.AllOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Convert a REXS file (1.0 to 2.0) to a gearbox file. Each value has its source; assumptions are marked."""
     from exugear.cli.tasks.rexs import import_rexs
     from exugear.exchange.rexs.to_case.notes import Rules
 
-    import_rexs(file, out, Rules(shifts, distances), as_json)
+    import_rexs(file, out, Rules(shifts, distances), as_json, whole)
 
 
 def schema(
@@ -112,7 +114,8 @@ def migrate(
     for change in changes:
         say(change)
     if changes:
-        say(f"{len(changes)} names replaced in {target}")
+        say(f"{len(changes)} name{'s' * (len(changes) != 1)} replaced")
+        say(f"Written: {target}")
     else:
         say(f"{file}: no old names")
 
@@ -129,15 +132,16 @@ def check(
     ] = False,
     out: options.OutOption = None,
     allow_dir: options.FilesBelowOption = None,
+    whole: options.AllOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Check a gearbox file and summarise it. Lists gear pairs, bearings and load cases; writes no files."""
     from exugear.cli.tasks import check as task
 
     if rating:
-        task.rate(case, out, allow_dir, as_json)
+        task.rate(case, out, allow_dir, as_json, whole)
     else:
-        task.check(case, allow_dir, as_json)
+        task.check(case, allow_dir, as_json, whole)
 
 
 def export(
@@ -156,6 +160,7 @@ def export(
     allow_dir: options.FilesBelowOption = None,
     shifts: options.ShiftsOption = "file",
     distances: options.DistancesOption = "agreeing",
+    whole: options.AllOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Write results into a copy of a REXS file. They are REXS attributes where possible, else custom_exugear ones.
@@ -166,4 +171,4 @@ def export(
     from exugear.cli.tasks.rexs import export_rexs
     from exugear.exchange.rexs.to_case.notes import Rules
 
-    export_rexs(case, rexs, to, out, allow_dir, Rules(shifts, distances), as_json)
+    export_rexs(case, rexs, to, out, allow_dir, Rules(shifts, distances), as_json, whole)

@@ -38,6 +38,7 @@ def ste(
     ] = False,
     out: options.OutOption = None,
     allow_dir: options.FilesBelowOption = None,
+    whole: options.AllOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Compute tables of the static transmission error. Also draws the curves and the teeth in contact.
@@ -52,9 +53,9 @@ def ste(
     if (method or gearbox.ste.method) == "nonlinear":
         if grid:
             raise BadInputError("--grid: the method nonlinear computes the static load only; remove --grid")
-        task.references(gearbox, out, mesh or [], positions, as_json)
+        task.references(gearbox, out, mesh or [], positions, as_json, whole)
     else:
-        task.ste(gearbox, out, mesh or [], positions, grid, as_json)
+        task.ste(gearbox, out, mesh or [], positions, grid, as_json, whole)
 
 
 def bearings(
@@ -65,6 +66,7 @@ def bearings(
     out: options.OutOption = None,
     allow_dir: options.FilesBelowOption = None,
     scripts: options.ScriptsOption = False,
+    whole: options.AllOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """List load, stiffness and life of the catalogue bearings.
@@ -78,7 +80,7 @@ def bearings(
     variant = variant or Variant.bushing
     if not variant.has_bearings:
         raise BadInputError(f"--variant {variant}: has ideal joints instead of bearings; use bushing or flexible")
-    task.bearings(open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias), as_json)
+    task.bearings(open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias), as_json, whole)
 
 
 def modes(
@@ -89,6 +91,7 @@ def modes(
     out: options.OutOption = None,
     allow_dir: options.FilesBelowOption = None,
     scripts: options.ScriptsOption = False,
+    whole: options.AllOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Compute eigenmodes and a Campbell diagram.
@@ -99,7 +102,7 @@ def modes(
     from exugear.cli.case import open_project
     from exugear.cli.tasks import modes as task
 
-    task.modes(open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias), as_json)
+    task.modes(open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias), as_json, whole)
 
 
 def steady(
@@ -127,10 +130,14 @@ def steady(
     speeds: Annotated[
         str | None,
         typer.Option(
-            metavar="FIRST:LAST:COUNT",
-            help="Input speeds, rpm, positive about +z. (default: range of the first load case)",
+            metavar="FIRST:LAST",
+            help="Range of input speeds, rpm, positive about +z. (default: range of the first load case)",
             show_default=False,
         ),
+    ] = None,
+    points: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="Number of speeds in the range. (default: 400)", show_default=False),
     ] = None,
     harmonics: Annotated[
         int | None,
@@ -146,6 +153,7 @@ def steady(
     out: options.OutOption = None,
     allow_dir: options.FilesBelowOption = None,
     scripts: options.ScriptsOption = False,
+    whole: options.AllOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Compute the steady-state response and rank the resonances.
@@ -158,7 +166,9 @@ def steady(
     project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias, load_case)
     if load_case is not None:
         project = project.at_load_case(load_case)
-    task.steady(project, task.settings_of_options(project, method, speeds, harmonics, branches), quantity, as_json)
+    asked = task.speeds_of_options(project, speeds, points)
+    settings = task.settings_of_options(project, method, asked, harmonics, branches)
+    task.steady(project, settings, quantity, as_json, whole)
 
 
 def run(
@@ -209,6 +219,7 @@ def run(
     out: options.OutOption = None,
     allow_dir: options.FilesBelowOption = None,
     scripts: options.ScriptsOption = False,
+    whole: options.AllOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Simulate a load case in the time domain.
@@ -225,6 +236,7 @@ def run(
     task.run(
         project,
         as_json,
+        whole,
         _resuming(context),
         solver=solver,
         mesh_route=mesh_route,
@@ -278,6 +290,7 @@ def study(
     out: options.OutOption = None,
     allow_dir: options.FilesBelowOption = None,
     scripts: options.ScriptsOption = False,
+    whole: options.AllOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Run a study: vary a gearbox and collect the results.
@@ -290,7 +303,7 @@ def study(
 
     opens = task.executor_of_options(executor, workers, scheduler)
     part = task.shard_of_options(shard, merge)
-    task.study(task.read_study(file, allow_dir, scripts), out, opens, part, merge, retry, as_json)
+    task.study(task.read_study(file, allow_dir, scripts), out, opens, part, merge, retry, as_json, whole)
 
 
 def loads(
@@ -298,6 +311,7 @@ def loads(
     out: options.OutOption = None,
     allow_dir: options.FilesBelowOption = None,
     scripts: options.ScriptsOption = False,
+    whole: options.AllOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Count the loads on each mesh and bearing.
@@ -308,7 +322,7 @@ def loads(
     from exugear.cli.case import read_gearbox
     from exugear.cli.tasks import loads as task
 
-    task.loads(read_gearbox(case, allow_dir, scripts), out, as_json)
+    task.loads(read_gearbox(case, allow_dir, scripts), out, as_json, whole)
 
 
 def losses(
@@ -331,6 +345,7 @@ def losses(
     ] = False,
     out: options.OutOption = None,
     allow_dir: options.FilesBelowOption = None,
+    whole: options.AllOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Compute losses of meshes, bearings and seals.
@@ -344,7 +359,7 @@ def losses(
     project = open_project(case, out, allow_dir, scripts=False, variant=Variant.rigid)
     if load_case is not None:
         project = project.at_load_case(load_case)
-    task.losses(project, speed, efficiency_map, as_json)
+    task.losses(project, speed, efficiency_map, as_json, whole)
 
 
 def life(
@@ -355,6 +370,7 @@ def life(
     out: options.OutOption = None,
     allow_dir: options.FilesBelowOption = None,
     scripts: options.ScriptsOption = False,
+    whole: options.AllOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Rate gears and bearings for their loads and service life.
@@ -365,7 +381,7 @@ def life(
     from exugear.cli.case import open_project
     from exugear.cli.tasks import life as task
 
-    task.life(open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias), as_json)
+    task.life(open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias), as_json, whole)
 
 
 def view(
@@ -395,6 +411,7 @@ def view(
     out: options.OutOption = None,
     allow_dir: options.FilesBelowOption = None,
     scripts: options.ScriptsOption = False,
+    whole: options.AllOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Write a web page of mode shapes and vibration in operation.
@@ -408,7 +425,7 @@ def view(
     if near is not None and resonance is not None:
         raise BadInputError(f"--near {near:g} and --resonance {resonance}: only one can be shown first; omit one")
     project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias)
-    task.view(project, near, resonance, quantity, animation, as_json)
+    task.view(project, near, resonance, quantity, animation, as_json, whole)
 
 
 def report(
@@ -452,6 +469,7 @@ def report(
         typer.Option(metavar="DIR", help="Results folder of another design to compare with.", show_default=False),
     ] = None,
     allow_dir: options.FilesBelowOption = None,
+    whole: options.AllOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
     """Write a report of a results folder as one web page.
@@ -463,4 +481,4 @@ def report(
     from exugear.cli.tasks import report as task
 
     changes = task.DesignOptions(levers, resonance, tuple(load or ()), quantity)
-    task.report(folder, near, stored, changes, compare, allow_dir, as_json)
+    task.report(folder, near, stored, changes, compare, allow_dir, as_json, whole)

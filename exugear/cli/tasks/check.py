@@ -4,31 +4,25 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from exugear.cli.case import assembled_by_iso, read_gearbox, steady_lack
-from exugear.cli.console import BadInputError, FailedError, counted, model_errors, note, print_json, say, warn
-from exugear.cli.rating_tables import print_rating
-from exugear.cli.tables import HARD_SPACE, Column, print_table, print_text, significant
+from exugear.cli.console import BadInputError, FailedError, model_errors, print_json
+from exugear.cli.rating_tables import rating_outcome
+from exugear.cli.tables import HARD_SPACE, Column, Outcome, Table, detail, significant
 from exugear.cli.watched import WatchedProject
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.load_cases import (
-    band_warning,
-    bearing_range_warning,
-    load_warnings,
-    missing_torque_warning,
-    other_load_warning,
-    summarise_loads,
-)
+from exugear.gearbox.load_cases import load_case_warnings, summarise_loads
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import OFFERED, Variant
 from exugear.life.rating.lacks import missing_for_life
 from exugear.project import default_folder
+from exugear.results.findings import Finding
 from exugear.results.folder import duty_summary
 from exugear.system.bearings.duty import estimate_effects
 from exugear.system.bodies.of_gearbox import solids_of
@@ -41,34 +35,27 @@ from exugear.transient.plan import check_duration
 from exugear.transient.runup import BAND
 
 
-def check(case: Path, allow_dir: Path | None, as_json: bool) -> None:
+def check(case: Path, allow_dir: Path | None, as_json: bool, whole: bool) -> None:
     """Check a gearbox file and print its summary."""
     gearbox = _read(case, allow_dir, as_json)
-    _print_scripts(gearbox)
     summary = summarise(gearbox)
-    if as_json:
-        print_json(summary)
-    else:
-        print_check(gearbox.case.overall.input, summary)
-        print_availability(summary)
-        for line in counted([f"Warning: {line}" for line in summary["warnings"]]):
-            note(line, style="yellow")
-    for load in summary["load_cases"]:
-        for doubt in load["doubts"]:
-            warn(f"load_cases.{load['load_case']}: {doubt}")
+    warnings = [*_scripts(gearbox), *summary["warnings"]]
+    warnings += [own["span_doubt"] for own in summary["tooth_thickness"] if own["span_doubt"]]
+    warnings += [f"load_cases.{own['load_case']}: {line}" for own in summary["load_cases"] for line in own["doubts"]]
+    Outcome(
+        verdict=f"{gearbox.name}: no errors; {gearbox.train.ratio_text}",
+        summary=summary,
+        tables=check_tables(gearbox.case.overall.input, summary),
+        findings=[Finding("warning", line) for line in warnings],
+        remarks=availability(summary),
+    ).show(as_json, whole)
 
 
-def rate(case: Path, out: Path | None, allow_dir: Path | None, as_json: bool) -> None:
+def rate(case: Path, out: Path | None, allow_dir: Path | None, as_json: bool, whole: bool) -> None:
     """Print the rating of all gears; end with code 1 if a safety factor is below the required one."""
     gearbox = read_gearbox(case, allow_dir, tell=not as_json)
     project = WatchedProject(gearbox, out or default_folder(case), Choice(Variant.bushing, "line_of_action"))
-    sheet = project.rating()
-    if as_json:
-        print_json({"case": str(case), "name": gearbox.name, "rating": sheet.summary()})
-    else:
-        print_rating(sheet)
-    if sheet.shortfalls:
-        raise FailedError("\n".join(["safety factors below the required minimum:", *sheet.shortfalls]))
+    rating_outcome(project.rating(), str(case), gearbox.name).show(as_json, whole)
 
 
 def _read(case: Path, allow_dir: Path | None, as_json: bool) -> Gearbox:
@@ -81,14 +68,13 @@ def _read(case: Path, allow_dir: Path | None, as_json: bool) -> Gearbox:
         raise
 
 
-def _print_scripts(gearbox: Gearbox) -> None:
-    """Check the solids, and print which of them require a script."""
+def _scripts(gearbox: Gearbox) -> Iterator[str]:
+    """Check the solids, and yield which of them require a script."""
     for key, model in solids_of(gearbox):
         if model.mesh.is_script:
-            note(
+            yield (
                 f"{key}.file = {model.mesh.path.name!r}: a gmsh script can run any command, so modes, run and "
-                "view want --allow-scripts or EXUGEAR_ALLOW_SCRIPTS=1 for the variant flexible",
-                style="yellow",
+                "view want --allow-scripts or EXUGEAR_ALLOW_SCRIPTS=1 for the variant flexible"
             )
 
 
@@ -257,13 +243,7 @@ def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
                 "fastest_rim_on": body,
                 "loaded_flanks": dict(loads.flanks),
                 "reversed_flanks": list(loads.reversed_flanks),
-                "doubts": [
-                    *load_warnings(loads),
-                    *filter(None, [missing_torque_warning(gearbox, case)]),
-                    *filter(None, [bearing_range_warning(gearbox, loads, Variant.bushing)]),
-                    *filter(None, [other_load_warning(gearbox, loads)]),
-                    *filter(None, [band_warning(loads, BAND)]),
-                ],
+                "doubts": list(load_case_warnings(gearbox, case, BAND, Variant.bushing)),
             }
         )
     return summaries
@@ -271,12 +251,14 @@ def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
 
 # Tables of a gearbox
 
-PAIR_LEGEND = "Gear 1 is the first gear of the pair; torque: static torque of the gearbox file."
-MARGIN_LEGEND = (
-    "σ_H0: nominal contact stress at the pitch point under the static torque, without load factors (ISO 6336-2). "
-    "SAP: start of active profile; its distance from the root form diameter in % of the profile length "
-    "(roll length). Backlash: circumferential, on the working circle. Held at: held_diameter_mm, at which the tables "
-    "fix the gear body; a smaller one of an external gear lowers the mesh stiffness."
+PAIR_LEGEND = (
+    "Torque: static torque of the file. σ_H0: nominal contact stress at the pitch point, without load factors (ISO "
+    "6336-2). Backlash: circumferential."
+)
+PAIR_DETAILS = (
+    "Gear 1 is the first gear of the pair. SAP: start of active profile; its distance from the root form diameter in % "
+    "of the profile length (roll length). Held at: held_diameter_mm, at which the tables fix the gear body; a smaller "
+    "one of an external gear lowers the mesh stiffness."
 )
 LOAD_LEGEND = "*: the speed of a body is prescribed (driven_body). "
 REVERSED_LEGEND = "!: the flank opposite to the flank loaded by the static load."
@@ -285,19 +267,6 @@ BEARING_LEGEND = (
     "estimated (not specified) inputs at their limits; dominant estimate: the input with the largest effect."
 )
 STATED_LEGEND = " *: specified in the gearbox file, used for the stiffness; static react.: static balance."
-
-
-PAIRS = (
-    Column("pair", "pair"),
-    Column("teeth", "teeth", lambda teeth: "{}/{}".format(*teeth)),
-    Column("centre\ndistance mm", "centre_distance_mm", ".3f"),
-    Column("working press.\nangle α_wt deg", "pressure_angle_deg", ".3f"),
-    Column(
-        "contact ratio\ntransv. overlap",
-        lambda pair: f"{pair['transverse_contact_ratio']:.3f}   {pair['overlap_ratio']:.3f}",
-    ),
-    Column("torque on\ngear 1 N m", "torque_gear_1_N_m", ".1f"),
-)
 
 
 def _backlash(ends: list[float]) -> str:
@@ -320,13 +289,21 @@ def _joined(form: str, factor: float = 1.0) -> Callable[[Iterable[float]], str]:
     return lambda values: " / ".join(format(factor * value, form) for value in values)
 
 
-MARGINS = (
+PAIRS = (
     Column("pair", "pair"),
+    Column("teeth", "teeth", lambda teeth: "{}/{}".format(*teeth)),
+    Column("centre\ndistance mm", "centre_distance_mm", ".2f"),
+    Column(
+        "contact ratio\nε_α    ε_β",
+        lambda pair: f"{pair['transverse_contact_ratio']:.2f}   {pair['overlap_ratio']:.2f}",
+    ),
+    Column("torque on\ngear 1 N m", "torque_gear_1_N_m", partial(significant, digits=4, decimals=1)),
     Column("σ_H0\nMPa", "sigma_H0_MPa", ".0f"),
-    Column("SAP above root\nform dia. %", "margin_to_form_diameter", _percent),
     Column("backlash\nµm", "backlash_um", _backlash),
-    Column("tip thickness\ns_an/m_n", "tip_thickness_in_modules", _joined(".2f")),
-    Column("held at\nmm", "held_diameter_mm", _joined("g")),
+    detail("working press.\nangle α_wt deg", "pressure_angle_deg", ".2f"),
+    detail("SAP above root\nform dia. %", "margin_to_form_diameter", _percent),
+    detail("tip thickness\ns_an/m_n", "tip_thickness_in_modules", _joined(".2f")),
+    detail("held at\nmm", "held_diameter_mm", _joined("g")),
 )
 THICKNESSES = (
     Column("gear", "gear"),
@@ -338,7 +315,7 @@ FORCES = (
     Column("force", "force"),
     Column("body", "body", is_text=True),
     Column("z position\nmm", "z_mm", "g"),
-    Column("force x, y, z\nkN", "force_N", _joined(".4g", 1e-3), is_text=True),
+    Column("force x, y, z\nkN", "force_N", _joined(".3g", 1e-3), is_text=True),
     Column("moment x, y\nN m", "moment_N_m", _joined(".4g"), is_text=True),
 )
 
@@ -353,7 +330,7 @@ def _loaded_flanks(load: Mapping[str, Any]) -> str:
 LOADS = (
     Column("load case", "load_case"),
     Column("net input\ntorque N m", lambda load: significant(load["net_torque_N_m"]) + "*" * bool(load["driven"])),
-    Column("final\nspeed rpm", "end_speed_rpm", ".4g"),
+    Column("final\nspeed rpm", "end_speed_rpm", partial(significant, digits=3)),
     Column("max. mesh\nfreq. kHz", "highest_mesh_frequency_Hz", ".3g", 1e-3),
     Column("max. tip\nspeed m/s", "fastest_rim_m_per_s", ".3g"),
     Column("loaded flank\nof gear 1", _loaded_flanks, is_text=True),
@@ -378,67 +355,54 @@ def _dominant_estimate(bearing: Mapping[str, Any]) -> str:
 
 
 def _radial_load(bearing: Mapping[str, Any]) -> str:
-    return significant(bearing["radial_load_kN"]) + "*" * (bearing["reaction_kN"] is not None)
+    return significant(bearing["radial_load_kN"], 3) + "*" * (bearing["reaction_kN"] is not None)
 
 
 def _reaction(bearing: Mapping[str, Any]) -> str:
     key = "radial_load_kN" if bearing["reaction_kN"] is None else "reaction_kN"
-    return significant(bearing[key])
+    return significant(bearing[key], 3)
 
 
 BEARINGS = (
     Column("bearing", "bearing"),
     Column("radial\nload kN", _radial_load),
     Column("static\nreact. kN", _reaction),
-    Column("axial\nload kN", "axial_load_kN", lambda load: significant(round(load, 3))),
+    Column("axial\nload kN", "axial_load_kN", lambda load: significant(round(load, 3), 3, 2)),
     Column("stiffness\nGN/m", "radial_stiffness_N_per_m", partial(significant, digits=3, decimals=5), 1e-9),
     Column("range\nGN/m", _stiffness_range),
     Column("dominant\nestimate", _dominant_estimate, is_text=True),
 )
 
 
-def print_check(body: str, summary: Mapping[str, Any]) -> None:
-    """Print the tables of a gearbox without errors, whose input is `body`."""
-    ratio = summary["ratio"]
-    inverse = f" (i = {1.0 / ratio:.4g})" if ratio else ""
-    print_text(f"{summary['name']}: no errors; speed ratio output/input {ratio:.6g}{inverse}")
-    if summary["pairs"]:
-        print_table("Gear pairs", summary["pairs"], PAIRS, PAIR_LEGEND)
-        print_table("Geometry checks, gear 1 / gear 2", summary["pairs"], MARGINS, MARGIN_LEGEND)
-    if summary["tooth_thickness"]:
-        print_table("Tooth thickness within its allowances", summary["tooth_thickness"], THICKNESSES)
-        for thickness in summary["tooth_thickness"]:
-            if thickness["span_doubt"]:
-                note(thickness["span_doubt"], style="yellow")
-    if summary["forces"]:
-        print_table("Constant forces on bodies", summary["forces"], FORCES)
-    loads = summary["load_cases"]
-    if loads:
-        band = 1e-3 * loads[0]["band_Hz"]
-        title = f'Load cases (rigid kinematics, speeds of body "{body}"; stored up to {band:g} kHz)'
-        legend = ""
-        if any(load["driven"] for load in loads):
-            legend += LOAD_LEGEND
-        if any(load["reversed_flanks"] for load in loads):
-            legend += REVERSED_LEGEND
-        print_table(title, loads, LOADS, legend.strip())
-    if summary["bearings"]:
-        stated = any(bearing["reaction_kN"] is not None for bearing in summary["bearings"])
-        columns = [column for column in BEARINGS if stated or column.key != _reaction]
-        legend = BEARING_LEGEND + STATED_LEGEND * stated
-        print_table("Bearings under the static load", summary["bearings"], columns, legend)
+def check_tables(body: str, summary: Mapping[str, Any]) -> list[Table]:
+    """Return the tables of a gearbox without errors, whose input is `body`."""
+    pairs, loads, bearings = summary["pairs"], summary["load_cases"], summary["bearings"]
+    band = 1e-3 * loads[0]["band_Hz"] if loads else 0.0
+    legend = LOAD_LEGEND if any(load["driven"] for load in loads) else ""
+    legend += REVERSED_LEGEND if any(load["reversed_flanks"] for load in loads) else ""
+    stated = any(bearing["reaction_kN"] is not None for bearing in bearings)
+    columns = [column for column in BEARINGS if stated or column.key != _reaction]
+    title = f'Load cases (rigid kinematics, speeds of body "{body}"; stored up to {band:g} kHz)'
+    return [
+        Table("Gear pairs", pairs, PAIRS, PAIR_LEGEND, PAIR_DETAILS, "gear pairs"),
+        Table("Tooth thickness within its allowances", summary["tooth_thickness"], THICKNESSES),
+        Table("Constant forces on bodies", summary["forces"], FORCES),
+        Table(title, loads, LOADS, legend.strip()),
+        Table("Bearings under the static load", bearings, columns, BEARING_LEGEND + STATED_LEGEND * stated),
+    ]
 
 
-def print_availability(summary: Mapping[str, Any]) -> None:
-    """Print which variants and which commands are available, and why others are not."""
+def availability(summary: Mapping[str, Any]) -> list[str]:
+    """Return which variants and which commands are available, and why others are not."""
+    lines = [
+        f"Variant {variant}: {f'not available, {reason}' if reason else 'available'}"
+        for variant, reason in summary["variants"].items()
+    ]
     steady = summary["steady"]
-    say("")
-    for variant, reason in summary["variants"].items():
-        print_text(f"Variant {variant}: {f'not available, {reason}' if reason else 'available'}", "  ")
     for reason in dict.fromkeys(filter(None, steady.values())):
         names = ", ".join(variant for variant in steady if steady[variant] == reason)
-        print_text(f"Steady-state response ({names}): not available, {reason}", "  ")
+        lines.append(f"Steady-state response ({names}): not available, {reason}")
     for verb, reasons in summary["life"].items():
-        say(f"Command {verb}: {'not ' * bool(reasons)}available")
-        for reason in reasons:
-            print_text(f"- {reason}", "  ")
+        why = f"not available: {'; '.join(reasons)}" if reasons else "available"
+        lines.append(f"Command {verb}: {why}")
+    return lines

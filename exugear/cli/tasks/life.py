@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-from exugear.cli.console import FailedError, make_results_folder, note, print_json, say
-from exugear.cli.tables import Column, print_table
+from exugear.cli.console import make_results_folder
+from exugear.cli.tables import Column, Outcome, Table, bearing_findings, failure_text, significant
 from exugear.cli.watched import WatchedProject
 from exugear.life.life_file import INFINITE, draw_life, summary
-from fe_ste.tools.display import life_text, without_round_off
+from exugear.results.findings import Finding
+from fe_ste.tools.display import life_text
 
-SHOWN_LIMITS = 8
+LEAST_DAMAGE = 1e-3
+"""Smaller damages are printed as such."""
 _column = partial(Column, missing="")
 CONTACT_LEGEND = (
     "σ_H life: largest over loads and mesh cycle within the path of contact, misaligned by each load, with K_v "
@@ -32,7 +35,7 @@ BEARING_LEGEND = (
 )
 
 
-def life(project: WatchedProject, as_json: bool) -> None:
+def life(project: WatchedProject, as_json: bool, whole: bool) -> None:
     """Compute, store and print the life of a project."""
     counted = project.checked_loads()
     make_results_folder(project.folder)
@@ -40,13 +43,19 @@ def life(project: WatchedProject, as_json: bool) -> None:
     path = project.life_path
     draw_life(data, path.with_suffix(".png"))
     found = {"case": project.gearbox.source, **summary(data), "file": str(path)}
-    if as_json:
-        print_json(found)
-    else:
-        print_life(found, float(data.attrs["life_years"]))
-        say(f"Results: {path}; CSV tables and a picture in the same folder")
-    if lines := [*found["failures"], *found["shortfalls"]]:
-        raise FailedError("\n".join(["required life not reached:", *lines, f"Results: {path}"]))
+    failures = [*found["failures"], *found["shortfalls"]]
+    Outcome(
+        verdict=_verdict(found, float(data.attrs["life_years"]), float(data["hours"].sum())),
+        summary=found,
+        tables=life_tables(found),
+        findings=[
+            *bearing_findings(found["remarks"]),
+            *(Finding("warning", line) for line in found["reliefs"]),
+            *(Finding("note", line) for key in ("assumptions", "unrated") for line in found[key]),
+        ],
+        path=f"{path}, CSV tables, life.png",
+        failure=failure_text("required life not reached:", failures),
+    ).show(as_json, whole)
 
 
 def _flank(kind: str) -> Column:
@@ -55,13 +64,17 @@ def _flank(kind: str) -> Column:
     return Column("gear, flank, mesh", lambda row: f"{row['flank']} ({row[key]})" if row[key] else row["flank"])
 
 
+def _damage(value: float) -> str:
+    return f"<{LEAST_DAMAGE:g}" if value < LEAST_DAMAGE else significant(value, 2)
+
+
 FLANKS = (
     _flank("contact"),
     _column("σ_H\nlife MPa", "contact_stress", ".0f", 1e-6),
     _column("σ_H0\nMPa", "nominal_contact", ".0f", 1e-6),
     _column("outside\n%", "outside", ".1f", 100.0),
     _column("K_Hbeta", "face_load", ".3f"),
-    _column("fatigue\ndamage", "contact_damage", ".3g"),
+    _column("fatigue\ndamage", "contact_damage", _damage),
     _column("S_H", "contact_safety", ".2f"),
     _column("S_H\nISO", "standard_contact_safety", ".2f"),
     _column("S_H\nstat.", "contact_static", ".2f"),
@@ -71,15 +84,15 @@ ROOTS = (
     _column("σ_F\nMPa", "root_stress", ".0f", 1e-6),
     _column("nominal\nMPa", "nominal_root", ".0f", 1e-6),
     _column("minimum\nMPa", "compression", ".0f", 1e-6),
-    _column("fatigue\ndamage", "root_damage", ".3g"),
+    _column("fatigue\ndamage", "root_damage", _damage),
     _column("S_F", "root_safety", ".2f"),
     _column("S_F\nISO", "standard_root_safety", ".2f"),
     _column("S_F\nstat.", "root_static", ".2f"),
 )
 BEARINGS = (
     Column("bearing", "bearing"),
-    _column("largest\nkN", "largest_load", ".4g", 1e-3),
-    _column("equiv.\nkN", "equivalent", ".4g", 1e-3),
+    _column("largest\nkN", "largest_load", partial(significant, digits=3), 1e-3),
+    _column("equiv.\nkN", "equivalent", partial(significant, digits=3), 1e-3),
     _column("L10\nh", "basic_hours", life_text),
     _column("L10r\nh", "reference_hours", life_text),
     _column("L10m\nh", "modified_hours", life_text),
@@ -87,26 +100,65 @@ BEARINGS = (
     _column("stress\nMPa", "pressure", ".0f", 1e-6),
     _column("S_0", "static_safety", ".2f"),
 )
-LIMITS = (Column("part", "part"), Column("failure mode", "by", is_text=True), _column("damage", "damage", ".3g"))
+MODES = {
+    "pitting": "contact_damage",
+    "tooth breakage": "root_damage",
+    "L10": "damage",
+    "L10r": "reference_damage",
+    "L10m": "modified_damage",
+}
+"""Key of the damage by each failure mode."""
 
 
-def print_life(found: Mapping[str, Any], years: float) -> None:
-    """Print the tables of flanks, roots and bearings, and the parts with the largest damage."""
-    for line in found["failures"]:
-        say(line)
-    if found["flanks"]:
-        title = "Tooth flanks: largest contact stress, safety against pitting"
-        print_table(title, found["flanks"], FLANKS, CONTACT_LEGEND)
-        print_table("Tooth roots: largest stress, safety against breakage", found["flanks"], ROOTS, ROOT_LEGEND)
-    if found["bearings"]:
-        print_table("Bearings: rating life, static safety", found["bearings"], BEARINGS, BEARING_LEGEND)
-        for bearing, remarks in found["remarks"].items():
-            for remark in remarks:
-                note(f"{bearing}: {remark}", style="yellow")
-    worst = [limit for limit in found["limits"] if limit["damage"] == INFINITE or without_round_off(limit["damage"])]
-    if worst:
-        title = f"Parts with the largest fatigue damage in {years:g} years"
-        print_table(title, worst[:SHOWN_LIMITS], LIMITS, "Damage: 1 is failure at the design probability.")
-    for key, style in (("assumptions", ""), ("unrated", "yellow"), ("reliefs", "yellow")):
-        for line in found[key]:
-            note(line, style=style)
+def _shortest_life(part: Mapping[str, Any]) -> float | None:
+    hours = [part[key] for key in ("basic_hours", "reference_hours", "modified_hours") if key in part]
+    return min(hours, key=_number, default=None)
+
+
+def _number(value: float | str) -> float:
+    return math.inf if value == INFINITE else float(value)
+
+
+PARTS = (
+    Column("part", "part"),
+    Column("failure\nmode", "mode", is_text=True),
+    _column("damage", "damage", _damage),
+    _column("S_H", "contact_safety", ".2f"),
+    _column("S_F", "root_safety", ".2f"),
+    _column("S_0", "static_safety", ".2f"),
+    _column("life\nh", _shortest_life, life_text),
+)
+PART_LEGEND = (
+    "Damage: 1 is failure at the design probability. S_H, S_F: by finite elements, with load factors; stresses are "
+    "those of each mesh, misaligned by each load. Life: the shortest of L10, L10r and L10m."
+)
+
+
+def _parts(found: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return flanks and bearings with their largest damage, the largest first."""
+    parts = []
+    for part in (*found["flanks"], *found["bearings"]):
+        damages = {mode: _number(part[key]) for mode, key in MODES.items() if key in part}
+        mode = max(damages, key=lambda own: damages[own], default="")
+        name = part.get("flank") or part["bearing"]
+        parts.append({**part, "part": name, "mode": mode, "damage": damages.get(mode, 0.0)})
+    return sorted(parts, key=lambda part: -part["damage"])
+
+
+def _verdict(found: Mapping[str, Any], years: float, hours: float) -> str:
+    """Return whether the required life is reached, and which part limits it."""
+    parts = _parts(found)
+    worst = f": damage {PARTS[2].cell(parts[0])}, {parts[0]['part']}, {parts[0]['mode']}" if parts else ""
+    reached = "not reached" if found["failures"] or found["shortfalls"] else "reached"
+    return f"Life of {years:g} years, {hours:,.0f} h, {reached}{worst}"
+
+
+def life_tables(found: Mapping[str, Any]) -> list[Table]:
+    """Return the tables of all parts, and those of flanks, roots and bearings."""
+    title = "Tooth flanks: largest contact stress, safety against pitting"
+    return [
+        Table("Parts with the largest fatigue damage", _parts(found), PARTS, PART_LEGEND, noun="parts"),
+        Table(title, found["flanks"], FLANKS, CONTACT_LEGEND),
+        Table("Tooth roots: largest stress, safety against breakage", found["flanks"], ROOTS, ROOT_LEGEND),
+        Table("Bearings: rating life, static safety", found["bearings"], BEARINGS, BEARING_LEGEND),
+    ]

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from typing import Any
 
 from exugear.cli.case import assembled_by_iso
-from exugear.cli.console import BadInputError, FailedError, note, print_json, say, warn
-from exugear.cli.tables import Column, print_table, print_text, significant
+from exugear.cli.console import BadInputError, FailedError
+from exugear.cli.tables import Column, Outcome, Table, detail, significant
 from exugear.cli.watched import WatchedProject
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import static_load_in_words
@@ -18,17 +18,21 @@ from exugear.gearbox.variant import Variant
 from exugear.life.losses import Losses, losses_of, operating_speed
 from exugear.life.power_flow import SelfLockingError
 from exugear.project import Project
+from exugear.results.findings import Finding
 from exugear.system.gearbox_checks import lacking
 from exugear.system.operating_points import bearing_duties
 from fe_ste.transmission_error.table import MeshTable
 
-MESH_LEGEND = (
-    "H_V: gear loss factor, from the line loads of the table (*) or in closed form. mu_m: mean coefficient of friction "
-    "by Schlenk. Band: also by Niemann and Winter and, with a table, by Xu and Kahraman."
+LEGEND = "Band: by several methods of friction. Without churning and windage."
+DETAILS = (
+    "P, C: equivalent dynamic load and basic dynamic load rating. H_V: gear loss factor, from the line loads of the "
+    "table (*) or in closed form. µ_m: mean coefficient of friction by Schlenk; band: also by Niemann and Winter and, "
+    "with a table, by Xu and Kahraman. Series: the one whose constants SKF's frictional moment takes, otherwise the "
+    "mean and the band of all series of the type."
 )
-BEARING_LEGEND = (
-    "P: equivalent dynamic load; C: basic dynamic load rating; series: the one whose constants SKF's frictional moment "
-    "takes, otherwise the mean and the band of all series of the type."
+NOT_INCLUDED = (
+    "Not included: churning, windage, pumps, and seals without a table [seals.NAME]. They matter most at low torque "
+    "and high speed, where the efficiency is overestimated."
 )
 SHARES = (0.1, 0.25, 0.5, 0.75, 1.0)
 """Shares of speed and of torque of the efficiency map."""
@@ -36,7 +40,7 @@ FASTEST = 1e6
 """Highest speed, rpm."""
 
 
-def losses(project: WatchedProject, speed: float | None, efficiency_map: bool, as_json: bool) -> None:
+def losses(project: WatchedProject, speed: float | None, efficiency_map: bool, as_json: bool, whole: bool) -> None:
     """Compute and print the losses of a project."""
     gearbox = project.gearbox
     if speed is not None and not 0.0 < abs(speed) <= FASTEST:
@@ -50,10 +54,13 @@ def losses(project: WatchedProject, speed: float | None, efficiency_map: bool, a
     summary = {"case": gearbox.source, **summarise(found), "map": []}
     if efficiency_map:
         summary["map"] = _mapped(project, tables, chosen)
-    if as_json:
-        print_json(summary)
-    else:
-        _print(static_load_in_words(gearbox), summary)
+    Outcome(
+        verdict=_verdict(summary),
+        summary=summary,
+        tables=_tables(static_load_in_words(gearbox), summary),
+        findings=list(_findings(summary)),
+        remarks=[NOT_INCLUDED],
+    ).show(as_json, whole)
 
 
 def _duties(gearbox: Gearbox) -> Any:
@@ -133,7 +140,7 @@ def summarise(found: Losses) -> dict[str, Any]:
 
 
 def _kilowatts(power: float) -> str:
-    return significant(1e-3 * power, 4, 4)
+    return significant(1e-3 * power, 3)
 
 
 def _band(band: Sequence[float], digits: int = 2) -> str:
@@ -141,73 +148,74 @@ def _band(band: Sequence[float], digits: int = 2) -> str:
     low, high = band
     if low == high:
         return "–"
-    return f"{significant(1e-3 * low, digits, 4)}–{significant(1e-3 * high, digits, 4)}"
+    return f"{significant(1e-3 * low, digits)}–{significant(1e-3 * high, digits)}"
 
 
 def _families(part: Mapping[str, Any]) -> str:
     """Name of a family of equal parts, with their number."""
-    return f"{part['count']} x {part['family']}".removeprefix("1 x ")
+    return f"{part['count']} × {part['family']}".removeprefix("1 × ")
 
 
-LOSS = (Column("loss\nkW", "loss_W", _kilowatts), Column("band\nkW", "loss_band_W", _band))
-SPEED = Column("speed\nrpm", "speed_rpm", significant)
-MESHES = (
-    Column("meshes", _families),
-    Column("power\nkW", "power_W", _kilowatts),
-    Column("H_V", lambda mesh: f"{mesh['loss_factor']:.4f}" + "*" * mesh["from_table"]),
-    Column("mu_m", "friction", ".4f"),
-    *LOSS,
+def _loss_factor(part: Mapping[str, Any]) -> str | None:
+    return f"{part['loss_factor']:.3f}" + "*" * part["from_table"] if "loss_factor" in part else None
+
+
+_column, _detail = partial(Column, missing=""), partial(detail, missing="")
+PARTS = (
+    Column("part", lambda part: f"seal {part['name']}" if "name" in part else _families(part)),
+    _column("power\nkW", "power_W", _kilowatts),
+    _column("P/C", "load_ratio", ".2g"),
+    _column("speed\nrpm", "speed_rpm", partial(significant, digits=3)),
+    Column("loss\nkW", "loss_W", _kilowatts),
+    _column("band\nkW", "loss_band_W", _band),
+    _detail("H_V", _loss_factor),
+    _detail("µ_m", "friction", ".3f"),
+    _detail("P\nkN", "equivalent_load_N", partial(significant, digits=3), 1e-3),
+    _detail("series", "series"),
+    _detail("diameter\nmm", "diameter_mm", "g"),
 )
-BEARINGS = (
-    Column("bearings", _families),
-    Column("P\nkN", "equivalent_load_N", partial(significant, digits=3), 1e-3),
-    Column("P/C", "load_ratio", ".2g"),
-    SPEED,
-    Column("series", lambda bearing: bearing["series"] or "–"),
-    *LOSS,
-)
-SEALS = (Column("seals", "name"), Column("diameter\nmm", "diameter_mm", significant), SPEED, LOSS[0])
 
 
-def _print(load: str, summary: Mapping[str, Any]) -> None:
-    """Print the tables of parts, the efficiency, and what is assumed or not included."""
-    bearings = summary["bearings"]
-    title = f"Losses at {significant(summary['speed_rpm'])} rpm, {load}: meshes"
-    print_table(title, summary["meshes"], MESHES, MESH_LEGEND)
-    if bearings:
-        print_table("Bearings", bearings, BEARINGS, BEARING_LEGEND)
-    if summary["seals"]:
-        print_table("Seals", summary["seals"], SEALS)
+def _verdict(summary: Mapping[str, Any]) -> str:
+    """Return the efficiency and the power balance."""
     losses = f"{_kilowatts(summary['losses_W'])} kW"
     if summary["losses_band_W"][0] < summary["losses_band_W"][1]:
-        losses += f" (band {_band(summary['losses_band_W'], 4)})"
-    print_text(
-        f"Input {_kilowatts(summary['input_power_W'])} kW, losses {losses}, output "
-        f"{_kilowatts(summary['output_power_W'])} kW: efficiency {100.0 * summary['efficiency']:.2f} %. Oil "
-        f"{summary['oil_temperature_C']:.3g} °C, {significant(summary['viscosity_mm2_per_s'], 3)} mm²/s."
+        losses += f" ({_band(summary['losses_band_W'], 3)})"
+    return (
+        f"Efficiency {100.0 * summary['efficiency']:.1f} %: input {_kilowatts(summary['input_power_W'])} kW, losses "
+        f"{losses}, oil {summary['oil_temperature_C']:.0f} °C"
     )
-    print_text(
-        "Not included: churning, windage, pumps, and seals without a table [seals.NAME]. They matter most at low "
-        "torque and high speed, where the efficiency is overestimated."
-    )
-    if summary["output_power_W"] == 0.0:
-        warn("the losses exceed the power of the static load: every loaded body has to be driven")
-    if summary["assumed_roughness"]:
-        note("Roughness Ra 0.5 µm is assumed for gears without roughness_Ra_um or roughness_Rz_um in [rating.gears]")
-    if summary["bearings_without_data"]:
-        warn(f"no friction of bearings without a catalogue: {', '.join(summary['bearings_without_data'])}")
-    unknown = [bearing["family"] for bearing in bearings if not bearing["series"]]
-    if unknown:
-        note(
-            f"Unknown series of the bearings {', '.join(unknown)}: their friction is that of all series of the type; "
-            "set catalogue.designation or catalogue.series"
-        )
+
+
+def _tables(load: str, summary: Mapping[str, Any]) -> list[Table]:
+    """Return the efficiency map if there is one, and the losses of all parts."""
+    title = f"Losses at {significant(summary['speed_rpm'], 3)} rpm, {load}"
+    parts = [*summary["meshes"], *summary["bearings"], *summary["seals"]]
+    parts.sort(key=lambda part: -part["loss_W"])
+    tables = [Table(title, parts, PARTS, LEGEND, DETAILS, "parts")]
     if summary["map"]:
         efficiency = {
             (point["speed_share"], point["torque_share"]): point.get("efficiency") for point in summary["map"]
         }
         rows = [{"torque": torque, **{str(speed): efficiency[speed, torque] for speed in SHARES}} for torque in SHARES]
-        columns = [Column(f"{100 * speed:g} %\nspeed", str(speed), ".2f", 100.0) for speed in SHARES]
-        print_table("Efficiency, %", rows, [Column("torque", lambda row: f"{100 * row['torque']:g} %"), *columns])
+        columns = [Column(f"{100 * speed:g} %\nspeed", str(speed), ".1f", 100.0) for speed in SHARES]
+        torques = Column("torque", lambda row: f"{100 * row['torque']:g} %")
+        tables.insert(0, Table("Efficiency, %", rows, [torques, *columns]))
+    return tables
+
+
+def _findings(summary: Mapping[str, Any]) -> Iterator[Finding]:
+    """Yield what is assumed or not included."""
+    if summary["output_power_W"] == 0.0:
+        yield Finding("warning", "the losses exceed the power of the static load: every loaded body has to be driven")
+    if summary["bearings_without_data"]:
+        names = ", ".join(summary["bearings_without_data"])
+        yield Finding("warning", f"no friction of bearings without a catalogue: {names}")
+    if unknown := [bearing["family"] for bearing in summary["bearings"] if not bearing["series"]]:
+        text = f"unknown series of the bearings {', '.join(unknown)}: their friction is that of all series of the "
+        yield Finding("warning", f"{text}type; set catalogue.designation or catalogue.series")
+    if summary["assumed_roughness"]:
+        text = "roughness Ra 0.5 µm is assumed for gears without roughness_Ra_um or roughness_Rz_um in [rating.gears]"
+        yield Finding("warning", text)
     if not any(mesh["from_table"] for mesh in summary["meshes"]):
-        say("exugear ste computes the tables from which H_V follows.")
+        yield Finding("note", "exugear ste computes the tables from which H_V follows")

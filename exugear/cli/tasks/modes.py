@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from exugear.cli.console import print_json, refuse_not_converged, say, warn
-from exugear.cli.tables import HARD_SPACE, Column, print_table, print_text
+from exugear.cli.console import not_converged_failure
+from exugear.cli.tables import HARD_SPACE, Column, Outcome, Table, significant
 from exugear.cli.watched import WatchedProject
+from exugear.results.findings import Finding
 from exugear.results.spectra.run_spectra import report_mode
 from exugear.system.modal_damping import damping_in_words
 from exugear.system.modes import VISIBLE, Modes, unusual_damping
@@ -15,19 +18,19 @@ from exugear.system.statics import meshes_near_unconverged
 from fe_ste.tools.drawing import drawing_style, finish_figure, new_figure
 
 LEGEND = (
-    "TE part.: squared, mass-normalised participation of the mode in the overall TE (all modes: 100 %). TE amplif.: "
-    "overall TE at resonance per static TE of the dominant mesh. TE: transmission error. Energies: largest parts."
+    "Linearised at the static load. TE part.: participation in the overall transmission error (TE), all modes 100 %. "
+    "TE amplif.: overall TE at resonance per static TE of the dominant mesh."
 )
 
 
-def modes(project: WatchedProject, as_json: bool) -> None:
+def modes(project: WatchedProject, as_json: bool, whole: bool) -> None:
     """Compute, store and print the modes of a project."""
     project.begin()
     project.prepare()
     found = project.modes()
     path = project.modes_path
     assembly = found.assembly
-    summary = {
+    summary: dict[str, Any] = {
         "case": project.gearbox.source,
         "variant": assembly.variant,
         "mesh_model": assembly.mesh_model,
@@ -36,19 +39,21 @@ def modes(project: WatchedProject, as_json: bool) -> None:
         "file": str(path),
         "picture": str(_draw_campbell(found, path)),
     }
+    findings = []
     if found.growth_rate > 0.0:
-        warn(f"unstable: disturbances grow at up to {found.growth_rate:.3g} 1/s; a run would diverge")
-    if unusual := unusual_damping(found):
-        warn(unusual)
-    if as_json:
-        print_json(summary)
-    else:
-        print_modes(summary)
-        damping = damping_in_words(assembly.gearbox.case.damping)
-        factor = assembly.housing_factor
-        print_text(f"Linearised at the static load; housing stiffness factor {factor:g}; damping {damping}.")
-        say(f"Results: {path}; Campbell diagram: {summary['picture']}")
-    refuse_not_converged(meshes_near_unconverged(assembly))
+        text = f"unstable: disturbances grow at up to {found.growth_rate:.3g} 1/s; a run would diverge"
+        findings.append(Finding("warning", text, found.growth_rate))
+    findings += [Finding("warning", text) for text in filter(None, [unusual_damping(found)])]
+    damping = damping_in_words(assembly.gearbox.case.damping)
+    Outcome(
+        verdict=_verdict(summary["modes"]),
+        summary=summary,
+        tables=[mode_table(summary, whole)],
+        findings=findings,
+        path=f"{path}, {Path(summary['picture']).name}",
+        failure=not_converged_failure(meshes_near_unconverged(assembly)),
+        remarks=[f"Housing stiffness factor {assembly.housing_factor:g}; damping {damping}."],
+    ).show(as_json, whole)
 
 
 def mode_summaries(found: Modes) -> list[dict[str, Any]]:
@@ -83,28 +88,49 @@ def _elastic(key: str) -> Any:
     return lambda mode: mode[key] if mode["frequency_Hz"] > 0.0 else None
 
 
-def _energy(number: int) -> Any:
-    """Return a function that takes the parts of the kinetic or of the strain energy from the name of a mode."""
-    return lambda mode: mode["name"].replace(" %", "").partition("; strain energy: ")[number]
+def _energy(number: int, most: int | None) -> Any:
+    """Return a function that takes the largest parts of the kinetic or of the strain energy from the name of a mode."""
+
+    def parts(mode: Mapping[str, Any]) -> str:
+        listed = mode["name"].replace(" %", "").partition("; strain energy: ")[number].split(", ")
+        return ", ".join(part.replace(" ", HARD_SPACE) for part in listed[:most])
+
+    return parts
 
 
 COLUMNS = (
     Column("mode", "mode"),
-    Column("freq.\nHz", "frequency_Hz", ".1f"),
-    Column("damping\n%", _elastic("damping_ratio"), ".2f", 100),
-    Column("TE\npart. %", _elastic("te_participation"), ".2f", 100),
-    Column("TE\namplif.", _elastic("amplification"), ".2f"),
-    Column(
-        "kinetic energy\n%",
-        _energy(0),
-        lambda text: ", ".join(part.replace(" ", HARD_SPACE) for part in text.split(", ")),
-        is_text=True,
-    ),
-    Column("strain energy\n%", _energy(2), is_text=True),
+    Column("freq.\nHz", "frequency_Hz", partial(significant, digits=3, decimals=1)),
+    Column("damping\n%", _elastic("damping_ratio"), ".1f", 100),
+    Column("TE\npart. %", _elastic("te_participation"), ".1f", 100),
+    Column("TE\namplif.", _elastic("amplification"), ".1f"),
 )
 
 
-def print_modes(summary: dict[str, Any]) -> None:
-    """Print the table of modes; damping and TE participation are omitted for rigid-body modes."""
-    title = "Modes: variant {variant}, mesh model {mesh_model}, inertia set {inertias}".format_map(summary)
-    print_table(title, summary["modes"], COLUMNS, LEGEND)
+def _verdict(modes: Sequence[Mapping[str, Any]]) -> str:
+    """Return the number of modes and the one that takes the largest part in the transmission error."""
+    last, first = modes[-1], max(modes, key=lambda mode: mode["te_participation"])
+    text = f"{len(modes)} modes up to {COLUMNS[1].cell(last)} Hz"
+    if first["frequency_Hz"] > 0.0:
+        text += f"; largest TE participation {COLUMNS[3].cell(first)} %: mode {first['mode']}, "
+        text += f"{COLUMNS[1].cell(first)} Hz"
+    return text
+
+
+def mode_table(summary: Mapping[str, Any], whole: bool) -> Table:
+    """Return the table of modes by TE participation with the largest energies, or by frequency with all of them.
+
+    Damping and TE participation are omitted for rigid-body modes.
+    """
+    rows = summary["modes"]
+    if not whole:
+        rows = sorted(rows, key=lambda mode: -mode["te_participation"])
+    title = "Modes by {}: {variant}, {mesh_model}, {inertias}"
+    most = None if whole else 1
+    columns = [
+        *COLUMNS,
+        Column("kinetic energy\n%", _energy(0, most), is_text=True),
+        Column("strain energy\n%", _energy(2, most), is_text=True),
+    ]
+    title = title.format("frequency" if whole else "TE participation", **summary)
+    return Table(title, rows, columns, LEGEND, noun="modes")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import asdict, dataclass, replace
+from operator import attrgetter
 from pathlib import Path
 
 from exugear.cli.case import check_allow_dir
@@ -14,12 +15,10 @@ from exugear.cli.console import (
     interruption,
     model_errors,
     note,
-    print_json,
     progress_bar,
-    say,
-    warn,
 )
-from exugear.cli.tables import Column, print_table
+from exugear.cli.resonances import highest_resonance, resonance_table
+from exugear.cli.tables import Column, Outcome, Table
 from exugear.cli.watched import WatchedProject
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.named_files import Permissions
@@ -32,6 +31,7 @@ from exugear.report.findings.design_changes import LEAST_DB, DesignStudy, settin
 from exugear.report.findings.other_design import check_ranges
 from exugear.report.findings.words import QUANTITIES
 from exugear.report.writer import Report, write_report
+from exugear.results.findings import Finding
 from exugear.results.folder import CASE_FILE, read_stored_gearbox, time_noted, times_spent
 from exugear.results.run_file import load_run
 from exugear.steady.settings import SteadySettings, operating_speeds
@@ -62,12 +62,13 @@ def report(
     compare: Path | None,
     allow_dir: Path | None,
     as_json: bool,
+    whole: bool,
 ) -> None:
-    """Write the report of a results folder and print its statements."""
+    """Write the report of a results folder and print its highest resonances."""
     check_allow_dir(allow_dir)
     folder = _results_of(folder)
     if not folder.is_dir():
-        raise BadInputError(f"{folder}: no such folder; specify the results folder of `exugear run`")
+        raise BadInputError(f"{folder}: no such folder; specify the results folder of exugear run")
     if not changes.levers and (changes.resonance is not None or changes.loads):
         raise BadInputError("--resonance and --load are for design changes: add --levers")
     for load in changes.loads:  # before long work
@@ -93,7 +94,7 @@ def report(
             written = write_report(folder, near, tell, allow_dir, executor, other, changes.quantity)
     except ReportError as error:
         raise BadInputError(error) from error
-    _print_report(folder, written, study, as_json)
+    _outcome(folder, written, study).show(as_json, whole)
 
 
 def _check_comparison(folder: Path, other: Path, allow_dir: Path | None) -> None:
@@ -173,7 +174,7 @@ def _results_of(folder: Path) -> Path:
     below = default_folder(folder / "gearbox.toml")
     if (folder / CASE_FILE).is_file() or not (below / CASE_FILE).is_file() or not any(folder.glob("*.toml")):
         return folder
-    note(f"Note: {folder} contains the gearbox file; its results are in {below}")
+    note(f"{folder} contains the gearbox file; its results are in {below}")
     return below
 
 
@@ -184,36 +185,45 @@ def _parallel_worker() -> AbstractContextManager[Executor | None]:
     return nullcontext()
 
 
-def _print_report(folder: Path, written: Report, study: DesignStudy | None, as_json: bool) -> None:
+def _outcome(folder: Path, written: Report, study: DesignStudy | None) -> Outcome:
     spent = times_spent(folder)
-    for line in written.left_out:
-        warn(f"skipped: {line}")
-    for line in written.missing:
-        note(f"Not computed: {line}")
-    if as_json:
-        times = {entry.step: entry.seconds for entry in spent}
-        lists = {name: list(getattr(written, name)) for name in ("statements", "resonances", "missing", "left_out")}
-        changes = [{**asdict(one), "recommended": one.recommended} for one in (study.results if study else ())]
-        found = {"design_changes": changes, "design_changes_loads": list(study.loads) if study else []}
-        print_json({"report": str(written.path), **lists, **found, "seconds": times})
-        return
+    lists = {name: list(getattr(written, name)) for name in ("statements", "resonances", "missing", "left_out")}
+    changes = [{**asdict(one), "recommended": one.recommended} for one in (study.results if study else ())]
+    found = {"design_changes": changes, "design_changes_loads": list(study.loads) if study else []}
+    tables = [Table("Run time, last execution of each step", spent, TIMES, "Parallel steps overlap.")]
+    verdict = written.statements[0] if written.statements else "No results to summarise"
+    if written.headline is not None:
+        headline = written.headline
+        verdict = highest_resonance(headline.ranking)
+        model = f"{headline.choice.variant}, {headline.source}"
+        tables.insert(0, resonance_table(written.gearbox, headline.ranking, model))
+    findings = [*written.findings, *(Finding("warning", f"skipped: {line}") for line in written.left_out)]
     if study is not None:
-        _print_changes(study)
-    for line in written.statements:
-        say(f"- {line}")
-    print_table("Run time, last execution of each step", map(vars, spent), TIMES, "Parallel steps overlap.")
-    say(f"Report: {written.path}")
+        tables.insert(0, _changes(study))
+        findings += _unmet(study)
+    checks = {f"{finding.line}." for finding in written.findings}
+    return Outcome(
+        verdict=verdict,
+        summary={"report": str(written.path), **lists, **found, "seconds": {own.step: own.seconds for own in spent}},
+        tables=tables,
+        findings=findings,
+        path=written.path,
+        remarks=[
+            *(f"- {line}" for line in written.statements if line not in checks),
+            *(f"Not computed: {line}" for line in written.missing),
+        ],
+    )
 
 
 TIMES = (
-    Column("step", "step"),
-    Column("wall\ntime s", "seconds", ".1f"),
-    Column("memory\npeak MB", "memory", ".0f", 1e-6),
+    Column("step", attrgetter("step")),
+    Column("wall\ntime s", attrgetter("seconds"), ".1f"),
+    Column("memory\npeak MB", attrgetter("memory"), ".0f", 1e-6),
 )
 
 
-def _print_changes(study: DesignStudy) -> None:
-    """Print the recommended changes, and why each other one is not recommended."""
+def _changes(study: DesignStudy) -> Table:
+    """Return the table of the recommended changes, and why each other one is not recommended."""
     label = QUANTITIES[study.quantity]
     others = [name for name in QUANTITIES if name != study.quantity and name in study.amplitudes]
     columns = [
@@ -235,10 +245,16 @@ def _print_changes(study: DesignStudy) -> None:
     title = f"Design changes for resonance {study.number}, {study.frequency:.3g} Hz at {abs(study.speed) / RPM:.4g} rpm"
     title += f", {study.line}, dB; loads: {', '.join(study.loads)}"
     legend = "here: this peak; range: highest amplitude of any order. Only recommended changes are rated."
-    print_table(title, rows, columns, legend)
-    if study.requirements:
-        more = f"; and {len(study.requirements) - 1} more" if len(study.requirements) > 1 else ""
-        warn(f"requirements that the unchanged gearbox does not meet: {study.requirements[0]}{more}")
+    return Table(title, rows, columns, legend, noun="changes")
+
+
+def _unmet(study: DesignStudy) -> list[Finding]:
+    """Return a warning about requirements that the unchanged gearbox does not meet."""
+    if not study.requirements:
+        return []
+    more = f"; and {len(study.requirements) - 1} more" if len(study.requirements) > 1 else ""
+    text = f"requirements that the unchanged gearbox does not meet: {study.requirements[0]}{more}"
+    return [Finding("warning", text)]
 
 
 def _decibels(value: float) -> str:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from exugear.cli.case import read_gearbox
-from exugear.cli.console import BadInputError, counted, note, print_json, say, warn
+from exugear.cli.console import BadInputError
+from exugear.cli.tables import Outcome
 from exugear.exchange.rexs.containers import read_rexs
 from exugear.exchange.rexs.export.export import with_results
 from exugear.exchange.rexs.to_case.conversion import Imported, to_case
@@ -13,15 +14,14 @@ from exugear.exchange.rexs.to_case.loads import SPECTRUM
 from exugear.exchange.rexs.to_case.notes import Rules
 from exugear.exchange.rexs.tree import RexsError
 from exugear.project import default_folder
+from exugear.results.findings import Finding
 from fe_ste.tools.files import write_file
 
 NAME = "gearbox.toml"
 """Name of the file that an import writes."""
-SHOWN = 10
-"""Maximum number of replaced attributes that are printed."""
 
 
-def import_rexs(file: Path, out: Path | None, rules: Rules, as_json: bool) -> None:
+def import_rexs(file: Path, out: Path | None, rules: Rules, as_json: bool, whole: bool) -> None:
     """Write the gearbox file of a REXS file, and the table of its load spectrum."""
     # A REXS file may have two extensions.
     stem = file.name.removesuffix(".zip").removesuffix(".xml").removesuffix(".json").rsplit(".rexs", 1)[0]
@@ -36,24 +36,28 @@ def import_rexs(file: Path, out: Path | None, rules: Rules, as_json: bool) -> No
             write_file(table, content)
     write_file(target, imported.text.encode("utf-8"))
     gearbox = imported.gearbox
-    if as_json:
-        lists = {"changed": imported.changed, "checked": imported.checked, "left_out": imported.lost}
-        lists["ignored"] = imported.ignored
-        summary = {"file": str(target), "name": gearbox.name, "ratio": gearbox.train.ratio}
-        print_json({**summary, **{key: list(lines) for key, lines in lists.items()}})
-        return
-    for line in counted([f"Warning: not imported: {line}" for line in imported.lost]):
-        note(line, style="yellow")
-    for line in imported.changed:
-        warn(line)
+    lists = {"changed": imported.changed, "checked": imported.checked, "left_out": imported.lost}
+    lists["ignored"] = imported.ignored
     besides = len(imported.ignored) - len(imported.lost)
+    findings = [
+        Finding("warning", line) for line in (*(f"not imported: {line}" for line in imported.lost), *imported.changed)
+    ]
+    findings.append(Finding("warning", "values marked A in the file are assumed; check them"))
     if besides:
-        note(f"Also not imported, without effect on results: {besides} lines, listed at the top of {target.name}")
-    say(
-        f"{target}: speed ratio output/input {gearbox.train.ratio:.6g}, {len(gearbox.pairs)} gear pairs, "
-        f"{len(gearbox.bearings)} bearings"
-    )
-    say(f"Values marked A are assumed. Check them, then run: exugear check {target}")
+        text = f"also not imported, without effect on results: {besides} lines, listed at the top of {target.name}"
+        findings.append(Finding("note", text))
+    Outcome(
+        verdict=f"{gearbox.name}: {gearbox.train.ratio_text}; {len(gearbox.pairs)} gear pairs, "
+        f"{len(gearbox.bearings)} bearings",
+        summary={
+            "file": str(target),
+            "name": gearbox.name,
+            "ratio": gearbox.train.ratio,
+            **{key: list(lines) for key, lines in lists.items()},
+        },
+        findings=findings,
+        path=target,
+    ).show(as_json, whole)
 
 
 def _refuse_existing(path: Path) -> None:
@@ -73,7 +77,14 @@ def _imported(file: Path, target: Path, rules: Rules) -> Imported:
 
 
 def export_rexs(
-    case: Path, rexs: Path, to: Path | None, out: Path | None, allow_dir: Path | None, rules: Rules, as_json: bool
+    case: Path,
+    rexs: Path,
+    to: Path | None,
+    out: Path | None,
+    allow_dir: Path | None,
+    rules: Rules,
+    as_json: bool,
+    whole: bool,
 ) -> None:
     """Write the results of a gearbox into a copy of its REXS file."""
     target = to or rexs.with_name(_new_name(rexs.name))
@@ -85,18 +96,21 @@ def export_rexs(
     except RexsError as error:
         raise BadInputError(error) from error
     write_file(target, exported.content)
-    if as_json:
-        counts = {"attributes": exported.named, "custom_attributes": exported.own}
-        lists = {"replaced": list(exported.replaced), "left_out": list(exported.left_out)}
-        print_json({"file": str(target), **counts, **lists})
-        return
-    for line in exported.left_out:
-        warn(f"not exported: {line}")
-    for line in exported.replaced[:SHOWN]:
-        note(f"Replaced: {line}")
-    if len(exported.replaced) > SHOWN:
-        note(f"and {len(exported.replaced) - SHOWN} more replaced")
-    say(f"{target}: {exported.named} REXS attributes, {exported.own} custom_exugear_ attributes")
+    Outcome(
+        verdict=f"{exported.named} REXS attributes, {exported.own} custom_exugear_ attributes written",
+        summary={
+            "file": str(target),
+            "attributes": exported.named,
+            "custom_attributes": exported.own,
+            "replaced": list(exported.replaced),
+            "left_out": list(exported.left_out),
+        },
+        findings=[
+            *(Finding("warning", f"not exported: {line}") for line in exported.left_out),
+            *(Finding("note", f"replaced: {line}") for line in exported.replaced),
+        ],
+        path=target,
+    ).show(as_json, whole)
 
 
 def _new_name(name: str) -> str:

@@ -3,27 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
 from exugear.cli.case import check_friction
-from exugear.cli.console import BadInputError, FailedError, StoppedError, note, print_json, say, warn
+from exugear.cli.console import BadInputError, FailedError, StoppedError, note, warn
+from exugear.cli.tables import Outcome, significant
 from exugear.cli.watched import WatchedProject
-from exugear.gearbox.load_cases import (
-    band_warning,
-    bearing_range_warning,
-    friction_warning,
-    load_warnings,
-    missing_torque_warning,
-    other_load_warning,
-    summarise_loads,
-)
+from exugear.gearbox.load_cases import load_case_warnings
 from exugear.gearbox.parts import LoadCase
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.units import RPM
 from exugear.project import Project
+from exugear.results.findings import run_findings
 from exugear.results.folder import time_noted
 from exugear.results.run_file import PARTIAL_NAME, has_pieces, read_run
 from exugear.results.solver_comparison import SolverComparison
@@ -39,6 +33,7 @@ from fe_ste.tools.files import FileError
 def run(
     project: WatchedProject,
     as_json: bool,
+    whole: bool,
     command: str,
     *,
     solver: str,
@@ -70,7 +65,7 @@ def run(
     refuse_if_busy(project.run_directory)
     if resume and (reason := refuse_to_resume(project.run_directory)):
         raise BadInputError(f"--resume: {reason}; remove --resume")
-    _warn_before_run(project, duration, kept["band"])
+    said = _warn_before_run(project, duration, kept["band"])
     project.prepare()
     choice = project.choice
     label = f"run, {choice.variant}, {choice.load_case}, {choice.inertias}, {choice.mesh_model}, solver {solver}"
@@ -83,7 +78,7 @@ def run(
     if compared is not None and finished.complete:
         with time_noted(project.folder, f"comparison with Exudyn, {choice.variant}"):
             comparison = _compare(project, compared, kept)
-    _print_result(project.gearbox.source, finished, comparison, command, as_json)
+    _outcome(project.gearbox.source, finished, comparison, command, said).show(as_json, whole)
 
 
 def _compare(project: Project, duration: float, kept: Mapping[str, float]) -> SolverComparison:
@@ -156,18 +151,22 @@ def _duration_to_resume(project: Project, duration: float | None) -> float | Non
     return duration
 
 
-def _warn_before_run(project: Project, duration: float | None, band: float) -> None:
-    """Print warnings about probable sign errors of torques, and loads outside the range of bearing or mesh models."""
+def _warn_before_run(project: Project, duration: float | None, band: float) -> tuple[str, ...]:
+    """Print and return the warnings about the load case, before the run."""
+    choice = project.choice
     load_case = load_case_of(project)
-    law = LAWS[project.choice.mesh_model]
-    loads = summarise_loads(project.gearbox, load_case, project.choice.inertias, duration)
-    of_bearings = bearing_range_warning(project.gearbox, loads, project.choice.variant)
-    of_tables = other_load_warning(project.gearbox, loads, law.uses_single_load)
-    of_friction = friction_warning(project.gearbox, loads)
-    of_ends = missing_torque_warning(project.gearbox, load_case)
-    of_band = band_warning(loads, band)
-    for doubt in filter(None, (*load_warnings(loads), of_ends, of_bearings, of_tables, of_band, of_friction)):
-        warn(f"load_cases.{load_case.name}: {doubt}")
+    said = load_case_warnings(
+        project.gearbox,
+        load_case,
+        band,
+        choice.variant,
+        choice.inertias,
+        duration,
+        uses_single_load=LAWS[choice.mesh_model].uses_single_load,
+    )
+    for text in said:
+        warn(f"load_cases.{load_case.name}: {text}")
+    return said
 
 
 def _simulate(project: Project, resume: bool, command: str, **options: Any) -> Run:
@@ -187,8 +186,16 @@ def _simulate(project: Project, resume: bool, command: str, **options: Any) -> R
         raise StoppedError(f"results so far are kept in {directory}; resume with:\n{command}") from None
 
 
-def _print_result(case: str, finished: Run, comparison: SolverComparison | None, command: str, as_json: bool) -> None:
-    """Print the results of a run; end with code 130 if the user stopped it, with 1 if it is invalid."""
+def _outcome(
+    case: str, finished: Run, comparison: SolverComparison | None, command: str, said: Collection[str]
+) -> Outcome:
+    """Return what is printed of a run; end with code 130 if the user stopped it.
+
+    Parameters
+    ----------
+    command : resumes the run
+    said : warnings that were printed before it
+    """
     if not finished.complete and not finished.halted:
         so_far = "".join(f"\nInvalid so far: {reason}" for reason in finished.reasons)
         raise StoppedError(
@@ -197,16 +204,23 @@ def _print_result(case: str, finished: Run, comparison: SolverComparison | None,
     summary = {"case": case, **summarise(finished)}
     if comparison is not None:
         summary["apart_from_exudyn"] = comparison.difference
-    if as_json:
-        unknown = {key for key, value in summary.items() if isinstance(value, float) and not math.isfinite(value)}
-        print_json({key: None if key in unknown else value for key, value in summary.items()})
-    else:
-        _print_run(summary)
-        if comparison is not None:
-            say(comparison.words)
+    unknown = {key for key, value in summary.items() if isinstance(value, float) and not math.isfinite(value)}
+    data, attributes = read_run(finished.path, MESH_TIMES)
+    times = {name: float(np.max(data[name], initial=0.0)) for name in MESH_TIMES}  # a rotor has no meshes
+    found = run_findings(attributes, summary["energy_not_accounted_for"], times)
+    failure = ""
     if not finished.trusted:
         what = "the run is invalid:" if finished.complete else f"the run is invalid, aborted at {finished.end:.4g} s:"
-        raise FailedError("\n".join([what, *finished.reasons, f"Results: {finished.path}"]))
+        failure = "\n".join([what, *finished.reasons])
+    return Outcome(
+        verdict=f"{summary['simulated_s']:.4g} s simulated in {summary['wall_s']:.3g} s: final input speed "
+        f"{significant(abs(summary['input_speed_rpm']), 3)} rpm",
+        summary={key: None if key in unknown else value for key, value in summary.items()},
+        findings=[own for own in found if own.level != "error" and own.text not in said],
+        path=finished.path,
+        failure=failure,
+        remarks=[*_remarks(summary), *([comparison.words] if comparison is not None else [])],
+    )
 
 
 def summarise(finished: Run) -> dict[str, Any]:
@@ -236,26 +250,18 @@ def summarise(finished: Run) -> dict[str, Any]:
     }
 
 
-def _print_run(summary: Mapping[str, Any]) -> None:
-    say(
+def _remarks(summary: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the settings of a run and its numerical accuracy."""
+    yield (
         f"Variant {summary['variant']}, load case {summary['load_case']} ({summary['load']}), mesh model "
-        f"{summary['mesh_model']}, inertia set {summary['inertias']}: {summary['simulated_s']:g} s simulated in "
-        f"{summary['wall_s']:.1f} s wall time (solver {summary['solver']}); final input speed "
-        f"{summary['input_speed_rpm']:.1f} rpm"
+        f"{summary['mesh_model']}, inertia set {summary['inertias']}, solver {summary['solver']}."
     )
     if "stability_margin" in summary:
-        say(
-            f"Time step {1e6 * summary['step_s']:.4g} µs, stability margin {summary['stability_margin']:.1f}; "
+        yield (
+            f"Time step {1e6 * summary['step_s']:.3g} µs, stability margin {summary['stability_margin']:.1f}; "
             f"estimated integration error up to {summary['band_Hz'] / 1e3:g} kHz: "
-            f"{100.0 * abs(summary['expected_error_at_band']):.2g} % of amplitudes, "
-            f"{100.0 * summary['expected_error_of_resonances']:.2g} % of resonance peaks"
+            f"{100.0 * abs(summary['expected_error_at_band']):.1g} % of amplitudes, "
+            f"{100.0 * summary['expected_error_of_resonances']:.1g} % of resonance peaks."
         )
     if summary["tooth_friction_work_J"]:
-        say(f"Friction of the teeth included: it dissipates {1e-3 * summary['tooth_friction_work_J']:.4g} kJ")
-    outside = summary["longest_time_outside_table_s"]
-    if outside > 0.0:
-        say(
-            f"Warning: a mesh was outside the range of its table for {outside:.3g} s (extrapolated linearly; variable "
-            "extrapolation_time of the results). Widen the axes of [ste]."
-        )
-    say(f"Results: {summary['file']}")
+        yield f"Friction of the teeth included: it dissipates {1e-3 * summary['tooth_friction_work_J']:.3g} kJ."

@@ -13,22 +13,19 @@ from rich.progress import Progress, TaskID
 
 from exugear.cli.console import (
     BadInputError,
-    FailedError,
     interruption,
     make_results_folder,
     note,
-    print_json,
     progress_bar,
-    say,
-    warn,
 )
-from exugear.cli.tables import Column, print_table
+from exugear.cli.tables import Column, Outcome, Table, detail, failure_text, significant
 from exugear.cli.watched import WatchedProject, errors_of_tables
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.variant import Variant
 from exugear.project import default_folder
 from exugear.report.pictures.diagrams import contact_picture, draw_contact, draw_curves
+from exugear.results.findings import Finding
 from exugear.results.folder import keep_case, time_noted
 from exugear.system.bearings.rolling.rows import BearingError
 from exugear.system.bearings.stiffness import unsupported
@@ -57,7 +54,15 @@ LEAST_TABLE_POSITIONS = 8
 WORTH_A_PROCESS = 3
 
 
-def ste(gearbox: Gearbox, out: Path | None, names: list[str], positions: int | None, grid: bool, as_json: bool) -> None:
+def ste(
+    gearbox: Gearbox,
+    out: Path | None,
+    names: list[str],
+    positions: int | None,
+    grid: bool,
+    as_json: bool,
+    whole: bool,
+) -> None:
     """Compute, store and print the tables of the pairs of a gearbox."""
     if positions is not None and positions < LEAST_TABLE_POSITIONS:
         raise BadInputError(f"--positions {positions}: a table for dynamics requires at least {LEAST_TABLE_POSITIONS}")
@@ -71,18 +76,30 @@ def ste(gearbox: Gearbox, out: Path | None, names: list[str], positions: int | N
         with _curves_beside({**stored, **tables}, folder, requests) as curves:
             contacts = _draw_contacts(requests, tables, folder)
         pictures = curves.result() + contacts
-    _print_misalignment(project)
     summaries = [summarise(request, tables[request.name]) for request in requests]
-    if as_json:
-        print_json({"case": gearbox.source, "tables": summaries, "pictures": [str(path) for path in pictures]})
-    else:
-        print_table("Static transmission error", summaries, ERRORS, ERROR_LEGEND)
-        print_table("Stiffness and contact of aligned gears", summaries, CONTACTS, CONTACT_LEGEND)
-        say(f"Results: {folder / 'tables'}; pictures: {folder / 'pictures'}")
-    for line in few_positions(summaries):
-        warn(line)
-    if doubts := errors_of_tables(tables):
-        raise FailedError("\n".join(["invalid tables:", *doubts]))
+    doubts = errors_of_tables(tables)
+    Outcome(
+        verdict=_verdict(summaries),
+        summary={"case": gearbox.source, "tables": summaries, "pictures": [str(path) for path in pictures]},
+        tables=[Table("Static transmission error, aligned gears", summaries, TABLES, LEGEND, DETAILS, "pairs")],
+        findings=[
+            *(Finding("warning", line) for line in few_positions(summaries)),
+            *(Finding("note", line) for line in _misalignment(project)),
+            *(Finding("note", f"{own.name}: cached table of the same input") for own in requests if own.stored),
+        ],
+        path=f"{folder / 'tables'}, {folder / 'pictures'}",
+        failure=failure_text("invalid tables:", doubts),
+    ).show(as_json, whole)
+
+
+def _verdict(summaries: Sequence[Mapping[str, Any]]) -> str:
+    """Return the largest peak-to-peak transmission error."""
+    known = [table for table in summaries if table["ste_peak_to_peak_um"] is not None]
+    text = f"{len(summaries)} table{'s' * (len(summaries) != 1)} of transmission error"
+    if not known:
+        return text
+    largest = max(known, key=lambda table: table["ste_peak_to_peak_um"])
+    return f"{text}: at most {significant(largest['ste_peak_to_peak_um'], 3)} µm peak-to-peak ({largest['pair']})"
 
 
 def few_positions(summaries: Sequence[Mapping[str, Any]]) -> Iterator[str]:
@@ -105,8 +122,8 @@ def few_positions(summaries: Sequence[Mapping[str, Any]]) -> Iterator[str]:
             )
 
 
-def _print_misalignment(project: WatchedProject) -> None:
-    """Print the misalignment of the gears, which static tables neglect; nothing if bearing data are unknown."""
+def _misalignment(project: WatchedProject) -> Iterator[str]:
+    """Yield the misalignment of the gears, which static tables neglect; nothing if bearing data are unknown."""
     if unsupported(project.gearbox, project.choice.variant) or missing_tables(project.gearbox, project.folder):
         return
     try:
@@ -119,7 +136,7 @@ def _print_misalignment(project: WatchedProject) -> None:
         pair = element.mesh.pair
         largest[pair.name] = max(largest.get(pair.name, 0.0), abs(float(misalignment)) * pair.face_width)
     words = ", ".join(f"{name} {1e6 * opening:.1f} µm" for name, opening in largest.items())
-    note(f"Misalignment under the static load, gap over the face width: {words} (details: exugear bearings)")
+    yield f"misalignment under the static load, gap over the face width: {words} (details: exugear bearings)"
 
 
 def _requested_tables(
@@ -137,7 +154,6 @@ def _requested_tables(
     project.keep_case()
     for request in requests:
         if request.stored:
-            note(f"{request.name}: cached table of the same input: {request.path}")
             continue
         if request.replaces:
             note(request.replaces)
@@ -147,7 +163,9 @@ def _requested_tables(
     return requests
 
 
-def references(gearbox: Gearbox, out: Path | None, names: list[str], positions: int | None, as_json: bool) -> None:
+def references(
+    gearbox: Gearbox, out: Path | None, names: list[str], positions: int | None, as_json: bool, whole: bool
+) -> None:
     """Run the reference analysis of the pairs and print results; each position is stored when it is complete."""
     folder = out or default_folder(gearbox.source)
     requests = requested_references(gearbox, folder, names, positions)
@@ -159,21 +177,20 @@ def references(gearbox: Gearbox, out: Path | None, names: list[str], positions: 
         for request in requests:
             tables[request.name] = _compute_reference(request, bar, task)
     summaries = [summarise_reference(request, tables[request.name]) for request in requests]
-    if as_json:
-        print_json({"case": gearbox.source, "tables": summaries})
-    else:
-        title = "Static transmission error, nonlinear finite elements"
-        print_table(title, summaries, REFERENCES, REFERENCE_LEGEND)
-        say(f"Results: {folder / 'tables'}")
     failures = [f"{name}: {line}" for name, table in tables.items() for line in table.failures]
     doubts = reference_warnings(summaries)
-    errors = []
-    if failures:
-        errors += ["positions not converged:", *failures]
-    if doubts:
-        errors += ["the methods differ by more than the limit:", *doubts]
-    if errors:
-        raise FailedError("\n".join(errors))
+    errors = (
+        failure_text("positions not converged:", failures),
+        failure_text("the methods differ by more than the limit:", doubts),
+    )
+    title = "Static transmission error, nonlinear finite elements"
+    Outcome(
+        verdict=_verdict(summaries),
+        summary={"case": gearbox.source, "tables": summaries},
+        tables=[Table(title, summaries, REFERENCES, REFERENCE_LEGEND, noun="pairs")],
+        path=folder / "tables",
+        failure="\n".join(filter(None, errors)),
+    ).show(as_json, whole)
 
 
 def _compute_reference(request: ReferenceRequest, bar: Progress, task: TaskID) -> NonlinearTable:
@@ -226,14 +243,14 @@ def _draw_contacts(requests: list[TableRequest], tables: dict[str, MeshTable], f
     return pictures
 
 
-ERROR_LEGEND = (
-    "Torque: of gear 1. TE: transmission error, mean and peak-to-peak (p-p) over the mesh cycle; p-p error: estimated "
-    "from every second position. 1. to 4.: harmonics, zero-to-peak."
+LEGEND = (
+    "Torque: of gear 1. TE: transmission error, mean and peak-to-peak (p-p). K_Hbeta, σ_H: finite elements, parallel "
+    "axes, no load factors."
 )
-CONTACT_LEGEND = (
-    "Stiffness: mean mesh stiffness, with what lies between held_diameter_mm and the teeth. σ_H0: nominal, at pitch "
-    "point (ISO 6336-2). K_Hbeta, σ_H aligned: of finite elements, parallel axes, largest of the mesh cycle within the "
-    "path of contact, no load factors. Converged: of all states of the table."
+DETAILS = (
+    "p-p error: estimated from every second position. 1. to 4.: harmonics, zero-to-peak. Stiffness: of the mesh, mean, "
+    "with what lies between held_diameter_mm and the teeth. σ_H0: nominal, at pitch point (ISO 6336-2). σ_H aligned: "
+    "largest of the mesh cycle within the path of contact. Converged: of all states of the table."
 )
 LARGEST_ERROR = 0.1
 """Estimated error of the peak-to-peak transmission error, over its value, from which more positions are advised."""
@@ -244,7 +261,7 @@ REFERENCE_LEGEND = (
 )
 
 
-PAIR = (Column("pair", "pair"), Column("torque\nN m", "torque_gear_1_N_m", ".1f"))
+PAIR = (Column("pair", "pair"), Column("torque\nN m", "torque_gear_1_N_m", partial(significant, decimals=1)))
 
 
 def _harmonic(number: int, table: Mapping[str, Any]) -> str:
@@ -252,30 +269,28 @@ def _harmonic(number: int, table: Mapping[str, Any]) -> str:
     return "-" if value is None else f"{value:.3f}"
 
 
-ERRORS = (
+CONVERGED = detail("states\nconv.", lambda table: f"{table['states'] - table['not_converged']}/{table['states']}")
+TABLES = (
     *PAIR,
     Column("TE mean\nµm", "ste_mean_um", ".2f"),
-    Column("TE p-p\nµm", "ste_peak_to_peak_um", ".3f"),
-    Column("p-p err.\nµm", "ste_peak_to_peak_error_um", ".3f"),
-    *(Column(f"{n + 1}.\nµm", partial(_harmonic, n)) for n in range(HARMONICS)),
-)
-CONTACTS = (
-    *PAIR,
-    Column("stiffn.\nMN/m", "mesh_stiffness_mean_N_per_m", ".4g", 1e-6),
-    Column("σ_H0\nMPa", "sigma_H0_MPa", ".0f"),
+    Column("TE p-p\nµm", "ste_peak_to_peak_um", ".2f"),
+    Column("stiffn.\nMN/m", "mesh_stiffness_mean_N_per_m", partial(significant, digits=3), 1e-6),
     Column("K_Hbeta\naligned", "K_Hbeta_aligned", ".2f"),
     Column("σ_H\naligned MPa", "sigma_H_aligned_MPa", ".0f"),
-    Column("states\nconv.", lambda table: f"{table['states'] - table['not_converged']}/{table['states']}"),
+    detail("σ_H0\nMPa", "sigma_H0_MPa", ".0f"),
+    detail("p-p err.\nµm", "ste_peak_to_peak_error_um", ".3f"),
+    *(detail(f"{n + 1}.\nµm", partial(_harmonic, n)) for n in range(HARMONICS)),
+    CONVERGED,
 )
 REFERENCES = (
     *PAIR,
     Column("TE mean\nµm", "ste_mean_um", ".2f"),
     Column("table\nmean µm", "superelement_mean_um", ".2f"),
     Column("diff.\n%", "difference_of_means_percent", "+.1f"),
-    Column("TE p-p\nµm", "ste_peak_to_peak_um", ".3f"),
-    Column("table\np-p µm", "superelement_peak_to_peak_um", ".3f"),
-    Column("σ_H\nMPa", "contact_stress_MPa", ".0f"),
-    Column("table\nσ_H MPa", "superelement_contact_stress_MPa", ".0f"),
-    Column("posit.\nconv.", CONTACTS[-1].key),
+    Column("TE p-p\nµm", "ste_peak_to_peak_um", ".2f"),
+    Column("table\np-p µm", "superelement_peak_to_peak_um", ".2f"),
+    detail("σ_H\nMPa", "contact_stress_MPa", ".0f"),
+    detail("table\nσ_H MPa", "superelement_contact_stress_MPa", ".0f"),
+    CONVERGED,
 )
 """Mean and peak-to-peak values by the reference analysis and by the method of the tables."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from functools import partial
 from operator import itemgetter
 from pathlib import Path
@@ -16,16 +17,14 @@ from exugear.cli.console import (
     FailedError,
     interruption,
     make_results_folder,
-    note,
-    print_json,
     progress_bar,
-    say,
 )
 from exugear.cli.process import let_in_dask
-from exugear.cli.tables import Column, print_table
+from exugear.cli.tables import Column, Outcome, Table, failure_text, significant
 from exugear.gearbox.named_files import Permissions
 from exugear.gearbox.reading import GearboxFileError
 from exugear.project import default_folder
+from exugear.results.findings import Finding
 from exugear.results.folder import STUDIES
 from exugear.studies.dataset import EVALUATION, Criteria, judged_name, slopes
 from exugear.studies.executors import ExecutorError, Opens, dask_cluster, processes
@@ -39,15 +38,24 @@ from exugear.system.tooth_mesh.laws.registry import LAWS
 
 SHOWN_FAILURES = 5
 SHOWN_OF_FRONT = 5
+SHOWN_COLUMNS = 7
+"""Maximum number of columns without ``--all``."""
 SLOPES = (
     Column("parameter", itemgetter(1)),
     Column("result", itemgetter(0), is_text=True),
-    Column("change per\nstep %", itemgetter(2), "+.3f", 100.0),
+    Column("change per\nstep %", itemgetter(2), "+.2f", 100.0),
 )
 
 
 def study(
-    read: Study, folder: Path | None, opens: Opens, shard: Shard, merge: bool, retry: bool, as_json: bool
+    read: Study,
+    folder: Path | None,
+    opens: Opens,
+    shard: Shard,
+    merge: bool,
+    retry: bool,
+    as_json: bool,
+    whole: bool,
 ) -> None:
     """Compute the points of a study, and print its results."""
     if read.file.optimise is not None and (merge or retry or shard != WHOLE):
@@ -64,19 +72,25 @@ def study(
     except (ExecutorError, OptimisationError) as error:
         raise FailedError(error) from error
     summary = summarise(read, result, _draw(read, folder, result))
-    if as_json:
-        print_json(summary)
-    else:
-        _print(read, folder, result, summary)
-    _fail_if_beyond(read, result)
+    Outcome(
+        verdict=_verdict(read, summary),
+        summary=summary,
+        tables=_tables(read, result.dataset),
+        findings=list(_findings(read, result, summary)),
+        path=folder if result.path is None else f"{result.path}, pictures",
+        failure="\n".join(filter(None, [_beyond(read, result), _failed(folder, summary)])),
+    ).show(as_json, whole)
+
+
+def _failed(folder: Path, summary: dict[str, Any]) -> str:
+    """Return how many points failed or are missing; empty if none."""
     if summary["failed"]:
         line = f"{summary['failed']} of {summary['points']} points failed; errors: {folder}; use --retry-failed to "
-        errors = [f"- {error}" for error in summary["errors"]]
-        raise FailedError("\n".join([f"{line}recompute them:", *errors]))
-    if summary["missing"] and result.path is not None:
-        raise FailedError(
-            f"{summary['missing']} of {summary['points']} points are missing; run the study, or the unfinished shards"
-        )
+        return failure_text(f"{line}recompute them:", [f"- {error}" for error in summary["errors"]])
+    if summary["missing"] and summary["file"] is not None:
+        missing = f"{summary['missing']} of {summary['points']} points are missing"
+        return f"{missing}; run the study, or the unfinished shards"
+    return ""
 
 
 def shard_of_options(text: str | None, merge: bool) -> Shard:
@@ -168,22 +182,52 @@ def summarise(study: Study, swept: StudyResult, pictures: list[Path]) -> dict[st
     }
 
 
-def _print(study: Study, folder: Path, swept: StudyResult, summary: dict[str, Any]) -> None:
-    say(
-        f"{study.file.name}: {summary['finished']} of {summary['points']} points finished, "
-        f"{summary['computed']} computed now, {summary['seconds_of_points']:.1f} s worker time in total"
-    )
-    if swept.dataset is None or swept.path is None:
-        note(f"{summary['missing']} points belong to other shards; the last shard, or --merge, writes the dataset")
-        say(f"Points: {folder}")
-        return
-    if SIDE in study.design.shape:
-        ranked = sorted(slopes(swept.dataset), key=lambda entry: -abs(entry[2]))
-        if ranked:
-            print_table("Sensitivity of the results, largest first", ranked, SLOPES)
+def _verdict(study: Study, summary: dict[str, Any]) -> str:
+    finished = f"{summary['finished']} of {summary['points']} points finished"
+    return f"{study.file.name}: {finished}, {summary['computed']} computed now"
+
+
+def _findings(study: Study, swept: StudyResult, summary: dict[str, Any]) -> Iterator[Finding]:
+    yield Finding("note", f"{summary['seconds_of_points']:.3g} s worker time in total")
+    if swept.dataset is None:
+        text = f"{summary['missing']} points belong to other shards; the last shard, or --merge, writes the dataset"
+        yield Finding("warning", text)
+    elif study.tolerances is not None:
+        for name in _judged(study):
+            yield Finding("note", f"{name}: {swept.dataset[name].attrs['long_name']}")
+
+
+def _tables(study: Study, dataset: xr.Dataset | None) -> list[Table]:
+    """Return the Pareto front, the sensitivities, or the results of all points."""
+    if dataset is None:
+        return []
     if study.file.optimise is not None:
-        _print_front(study, swept.dataset)
-    say(f"Results: {swept.path}; pictures in the same folder")
+        return [_front(study, dataset)]
+    if SIDE in study.design.shape:
+        ranked = sorted(slopes(dataset), key=lambda entry: -abs(entry[2]))
+        return [Table("Sensitivity of the results, largest first", ranked, SLOPES, noun="results")]
+    return [point_table(dataset, tuple(study.design.shape), tuple(study.file.parameters), tuple(study.file.outputs))]
+
+
+def point_table(
+    dataset: xr.Dataset, dimensions: Sequence[str], parameters: Sequence[str], outputs: Sequence[str]
+) -> Table:
+    """Return the results of all points: parameters and outputs with one value, in the units of the dataset."""
+    names = [name for name in (*parameters, *outputs) if name in dataset and set(dataset[name].dims) <= {*dimensions}]
+    cells = [
+        dataset[name].broadcast_like(dataset["seconds"]).transpose(*dimensions).to_numpy().ravel() for name in names
+    ]
+    rows = [dict(zip(names, row, strict=True)) for row in zip(*cells, strict=True)]
+    columns = [Column("point", lambda row: rows.index(row) + 1)]
+    for number, name in enumerate(names, start=2):
+        unit = dataset[name].attrs.get("units", "")
+        heading = name if unit in ("", "1") else f"{name}\n{unit}"
+        columns.append(Column(heading, name, _point_value, is_detail=number > SHOWN_COLUMNS))
+    return Table("Results of the points", rows, columns, noun="points")
+
+
+def _point_value(value: Any) -> str:
+    return str(value) if isinstance(value, str) else significant(float(value), 3)
 
 
 def _judged(study: Study) -> list[str]:
@@ -191,14 +235,14 @@ def _judged(study: Study) -> list[str]:
     return [judged_name(study, name, side) for name, side in Criteria.of(study.file).sides]
 
 
-def _fail_if_beyond(study: Study, swept: StudyResult) -> None:
-    """End with code 1 if no point of an optimisation is within its limits."""
+def _beyond(study: Study, swept: StudyResult) -> str:
+    """Return that no point of an optimisation is within its limits; empty otherwise."""
     data = swept.dataset
     if data is None or "meets_limits" not in data or data["meets_limits"].any():
-        return
+        return ""
     assert study.file.optimise is not None
     limits = (f"{name} {_limit_text(limit)}" for name, limit in study.file.optimise.limits.items())
-    raise FailedError(
+    return (
         f"none of the {data.sizes[EVALUATION]} evaluated points meets the limits {', '.join(limits)}; widen the limits "
         f"or parameter ranges, or set more generations. All points: {swept.path}"
     )
@@ -216,16 +260,16 @@ def _value(point: xr.Dataset, name: str) -> float:
     return float(point[name])
 
 
-def _print_front(study: Study, dataset: xr.Dataset) -> None:
-    """Print the start point of an optimisation, and some points of the Pareto front, spread over the front."""
+def _front(study: Study, dataset: xr.Dataset) -> Table:
+    """Return the start point of an optimisation, and some points of the Pareto front, spread over the front."""
     figures = _judged(study)
     front = dataset.isel(evaluation=dataset["on_front"].to_numpy() == 1).sortby(figures[0])
     shown = sorted({round(n) for n in np.linspace(0, front.sizes["evaluation"] - 1, SHOWN_OF_FRONT)})
     points = {"start\npoint": dataset.isel(evaluation=0)}
     points |= {f"point\n{n + 1}": front.isel(evaluation=n) for n in shown if front.sizes["evaluation"]}
-    columns = [Column(label, partial(_value, point), ".4g", missing="") for label, point in points.items()]
+    columns = [
+        Column(label, partial(_value, point), partial(significant, digits=3), missing="")
+        for label, point in points.items()
+    ]
     names = (*figures, *study.file.parameters)
-    print_table(f"Pareto front: {front.sizes['evaluation']} points", names, (PARAMETER, *columns))
-    if study.tolerances is not None:
-        for name in figures:
-            note(f"{name}: {dataset[name].attrs['long_name']}")
+    return Table(f"Pareto front: {front.sizes['evaluation']} points", names, (PARAMETER, *columns), noun="values")

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from exugear.cli.console import BadInputError, FailedError, note, print_json, say
+from exugear.cli.console import BadInputError, FailedError, warn
+from exugear.cli.tables import Outcome
 from exugear.cli.watched import WatchedProject
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.units import RPM
@@ -27,6 +28,7 @@ from exugear.report.pictures.scene import (
 from exugear.report.pictures.shapes import bodies_of, mode_scene, motions_of
 from exugear.report.web.mode_page import ModeRow, ResonanceRow, write_mode_page
 from exugear.report.writer import command_line
+from exugear.results.findings import Finding
 from exugear.steady.deflection_shapes import deflection_shapes
 from exugear.steady.steady_file import load_response, settings_of
 from exugear.system.modes import Modes
@@ -48,6 +50,7 @@ def view(
     quantity: str | None,
     animation: bool,
     as_json: bool,
+    whole: bool,
 ) -> None:
     """Write the page of a project."""
     project.begin()
@@ -73,12 +76,14 @@ def view(
     wanted = project.gearbox.case.report.reference_frequency_Hz if near is None else near
     first = int(modes.overall.argmax()) if wanted is None else modes.nearest(wanted)
     written = _draw(modes, headline, about, folder, first, resonance, animation)
-    if as_json:
-        shown = {"mode": first + 1} if resonance is None else {"resonance": resonance}
-        print_json({"case": project.gearbox.source, **shown, "files": [str(file) for file in written]})
-        return
-    for file in written:
-        say(str(file))
+    shown = {"mode": first + 1} if resonance is None else {"resonance": resonance}
+    page, *pictures = written
+    Outcome(
+        verdict=f"Page of {len(modes.frequency)} modes" + ("" if about else " and the resonances in operation"),
+        summary={"case": project.gearbox.source, **shown, "files": [str(file) for file in written]},
+        findings=[Finding("note", about)] if about else [],
+        path=", ".join([str(page), *(picture.name for picture in pictures)]),
+    ).show(as_json, whole)
 
 
 def _stored_response(assembly: Assembly, folder: Path) -> xr.Dataset | None:
@@ -229,6 +234,6 @@ def _draw_pictures(
             if animation:
                 moving.append(animate_mode(scene, animated))
     except RenderingError as error:
-        note(f"Warning: no pictures: {error}", style="yellow")
+        warn(f"no pictures: {error}")
         return []
     return [*moving, gearbox, still]

@@ -8,7 +8,7 @@ KINDS = {
     "pair": "one helical pair on ball bearings",
     "parallel": "two helical stages on three parallel shafts",
     "planetary": "a planetary stage with three planets and a fixed ring gear",
-    "wind": "a planetary and two parallel stages, size of a 1 MW wind turbine",
+    "wind": "a planetary and two parallel stages, size of a 600 kW wind turbine",
 }
 """Description of each kind."""
 

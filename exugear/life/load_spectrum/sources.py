@@ -442,7 +442,7 @@ class _SourceDraft:
                     f"{self.key}.{superfluous}: not applicable to a table of loads; remove the key"
                 )
         if self.section.files is not None:
-            raise self.gearbox.error(f"{self.key}.files: {path.name} is a table of counted loads; set it in `file`")
+            raise self.gearbox.error(f"{self.key}.files: {path.name} is a table of counted loads; use the key file")
 
     def source(self, by_wind: Mapping[float, float]) -> LoadSource:
         """Return the source with all samples in hours of the life."""

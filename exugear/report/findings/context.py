@@ -14,6 +14,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.variant import Variant, VariantError
+from exugear.results.findings import Finding
 from exugear.results.folder import bodies_folder
 from exugear.results.run_file import FINAL_NAME, PARTIAL_NAME, invalidity_of, load_run
 from exugear.results.spectra.run_spectra import RunSignals, VariantRun, analysed, run_signals
@@ -82,6 +83,8 @@ class ReportNotes:
 
     statements: list[str] = field(default_factory=list)
     """Statements of the summary."""
+    findings: list[Finding] = field(default_factory=list)
+    """Checks of the results that the headline is from, and invalid runs."""
     invalid_runs: list[str] = field(default_factory=list)
     """Invalid runs, with the reason."""
     left_out: list[str] = field(default_factory=list)
@@ -233,6 +236,7 @@ def _fitting_signals(context: Context, path: Path) -> tuple[RunSignals, float] |
         if verdict := invalidity_of(attributes):
             name = context.name_of(path)
             context.notes.invalid_runs.append(f"{name}: {verdict}")
+            context.notes.findings.append(Finding("warning", f"invalid run {name}: {verdict}"))
             context.notes.statements.append(f"Invalid: {name}: {verdict}")
         signals = run_signals(path)
         return signals, signals.suitable_window

@@ -174,7 +174,7 @@ def read_design_study(path: Path) -> DesignStudy:
         if not all(math.isfinite(value) for value in (study.frequency, study.speed, *study.amplitudes.values())):
             raise ValueError("numbers are not finite")
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
-        raise FileError(f"{path}: cannot be read as design changes ({error}); run `exugear report --levers`") from None
+        raise FileError(f"{path}: cannot be read as design changes ({error}); run exugear report --levers") from None
     return study
 
 

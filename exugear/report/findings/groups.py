@@ -238,7 +238,7 @@ def _group_runs(
     constant = {variant: level for variant, level in levels.items() if level is not None}
     response = most_complete_response(results.steady, Choice(list(by_variant)[-1], *key[1:]))
     loud = response if response is not None and is_over_speed(response) else None
-    return _group(context, f"run-up {key[0].replace('_', ' ')}", key, by_variant, windows, constant, {}, loud)
+    return _group(context, f"run-up {key[0]}", key, by_variant, windows, constant, {}, loud)
 
 
 def _group_responses(

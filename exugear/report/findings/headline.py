@@ -1,4 +1,4 @@
-"""The resonance that a report leads with: its mode, its cause, and what could overturn it.
+"""The resonance that a report leads with: its mode, its cause, and what could change it.
 
 All statements are about the first resonance of one `Ranking`: that of the most informative steady-state response, or
 else of a run-up, or else an estimate from modes and static transmission errors.

@@ -83,7 +83,7 @@ def read_other_design(context: Context, headline: Headline | None, folder: Path)
     other = headline_of(found, results, groups_of(found, results))
     for notes, place, own in ((context.notes, context.folder, headline), (found.notes, folder, other)):
         if own is None or own.group is None:
-            reason = f"{place}: no amplitudes to compare; run `exugear steady` with this results folder"
+            reason = f"{place}: no amplitudes to compare; run exugear steady with this results folder"
             raise ReportError("\n".join([reason, *notes.left_out]))
     assert headline is not None and other is not None
     both = (other.ranking.speeds, headline.ranking.speeds)
@@ -91,7 +91,7 @@ def read_other_design(context: Context, headline: Headline | None, folder: Path)
         ranges = [" to ".join(f"{speed / RPM:.5g}" for speed in ends) for ends in both]
         raise ReportError(
             f"{folder}: amplitudes are for {ranges[0]} rpm, those of {context.folder} for {ranges[1]} rpm; compute "
-            "both for the same speeds (`[operation] speed_range_rpm`)"
+            "both for the same speeds ([operation] speed_range_rpm)"
         )
     cautions = [
         f"{what}: {first}; other design: {second}."
@@ -124,7 +124,7 @@ def check_ranges(own: Gearbox, other: Gearbox) -> None:
     texts = [" to ".join(f"{speed / RPM:.5g}" for speed in ends) for ends in ranges]
     raise ReportError(
         f"{other.source}: operating range {texts[1]} rpm; that of {own.source} is {texts[0]} rpm; designs are compared "
-        "in the same range (`[operation] speed_range_rpm`)"
+        "in the same range ([operation] speed_range_rpm)"
     )
 
 

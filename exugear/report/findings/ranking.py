@@ -18,6 +18,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.units import RPM
 from exugear.report.findings.context import choice_of
+from exugear.results.findings import Finding
 from exugear.results.spectra.line_spectra import LineSpectra, line_spectra
 from exugear.results.spectra.waterfall import OrderLine
 from exugear.steady.harmonics.branches import standing_peaks
@@ -158,6 +159,14 @@ class Ranking:
     def wanted(self) -> str:
         """Name of the deciding quantity in a gearbox file."""
         return next(name for name, own in DECIDING.items() if self.quantity in own)
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Warning if another range than the operating range is evaluated."""
+        if not self.whole:
+            return ()
+        text = "no computed speed is in an operating range, so all speeds are ranked; add rated_speed_rpm or "
+        return (Finding("warning", f"{text}speed_range_rpm to [operation]"),)
 
     def leader(self, quantity: str) -> Resonance | None:
         """Return the resonance with the highest amplitude of a quantity; None without a peak."""

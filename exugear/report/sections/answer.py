@@ -75,7 +75,7 @@ class Box:
 
 
 def short_section(material: ReportData) -> Part:
-    """Show the first resonance of the ranking: amplitudes, mode, cause, remedies, and what could overturn it."""
+    """Show the first resonance of the ranking: amplitudes, mode, cause, remedies, and what could change it."""
     headline = material.headline
     notes = material.context.notes.statements
     if headline is None:
@@ -213,9 +213,9 @@ def _quantity(material: ReportData, headline: Headline, top: Resonance, name: st
 def _note(material: ReportData, headline: Headline) -> str:
     """Say what the amplitudes are of."""
     if headline.group is None:
-        return "Estimate: amplification of the mode times static transmission error; `exugear steady` computes more."
+        return "Estimate: amplification of the mode times static transmission error; exugear steady computes more."
     if headline.response is None:
-        return "Amplitudes in the run-up; `exugear steady` adds bearing forces and accelerations at constant speed."
+        return "Amplitudes in the run-up; exugear steady adds bearing forces and accelerations at constant speed."
     band = material.context.gearbox.case.damping.modal_band_percent
     damping = "half to twice the value used" if band is None else f"{band[0]:g} to {band[1]:g} % of critical"
     decides = QUANTITIES[headline.ranking.quantity].column
@@ -246,7 +246,7 @@ def _strips(
 def _resonance_box(material: ReportData, headline: Headline, mode: MatchedMode | None) -> Box:
     modes = headline.modes
     if mode is None or modes is None:
-        return Box("No modes computed; run `exugear modes`." if modes is None else "No mode near its frequency.")
+        return Box("No modes computed; run exugear modes." if modes is None else "No mode near its frequency.")
     words = material.words
     moving = {f"{body} {motion}": share for (body, motion), share in words.kinetic_energy(modes, mode.index).items()}
     assembly = material.context.assembled(headline.choice)
@@ -330,7 +330,7 @@ def _further(
         peaks = ", ".join(amplitude_text(name, own.amplitude) for name, own in outside.amplitudes.items())
         yield "Just outside the range", [f"{rounded_text(outside.frequency)} Hz at {speed_text(outside)}: {peaks}."]
     if doubts := list(_doubts(material, headline, top)):
-        yield "What could overturn this", [short(*doubts)]
+        yield "What could change this answer", [short(*doubts)]
 
 
 def _shortfalls(material: ReportData) -> Iterator[str]:
@@ -442,7 +442,7 @@ def ranking_section(material: ReportData) -> Part:
         name="resonances",
         sortable=True,
         stacked=True,
-        hidden=("off rated / %", "place", "mode"),
+        hidden=("from rated / %", "place", "mode"),
     )
     html = render(
         "ranking",
@@ -469,7 +469,7 @@ def _row(
     }
     if rated is not None:
         off = 100.0 * (rpm / rated - 1.0)
-        row["off rated / %"] = Cell(f"{off:+.0f}".replace("-", "−").replace("+0", "0").replace("−0", "0"), off)
+        row["from rated / %"] = Cell(f"{off:+.0f}".replace("-", "−").replace("+0", "0").replace("−0", "0"), off)
     row["excited by"] = words.line(words.order(resonance.line, resonance.order))
     for name in _sorted_quantities(headline, resonance):
         own = resonance.amplitudes[name]

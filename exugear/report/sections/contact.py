@@ -76,7 +76,7 @@ def _cell(value: float) -> Cell:
 
 
 def _pair(material: ReportData, own: PairContact, ripple: PairExcitation | None) -> dict[str, Any]:
-    states = {"Aligned": own.aligned, "As held under the static load": own.actual}
+    states = {"Aligned": own.aligned, "Misaligned as under the static load": own.actual}
     highest = max(state.highest[0] for state in states.values())
     heaviest = 1.05 * max(float(state.line_load.max()) for state in states.values())
     maps = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from exugear.gearbox.load_cases import static_load_in_words
@@ -11,10 +12,11 @@ from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.facts import facts_of
 from exugear.report.findings.groups import RankedResonance, RunGroup
-from exugear.report.findings.result_checks import CheckResult, validity_checks
+from exugear.report.findings.result_checks import validity_checks
 from exugear.report.findings.words import figure_text, percentages
 from exugear.report.sections.material import Part, ReportData, group_words
 from exugear.report.web.html import Cell, Figure, Table, render
+from exugear.results.findings import Finding
 from exugear.results.spectra.resonances import Pick
 from exugear.results.spectra.run_spectra import WINDOW_FACTORS, AbsenceRule, VariantRun
 
@@ -25,14 +27,15 @@ def checks_section(material: ReportData) -> Part:
         return Part()
     group = material.groups[0]
     verdicts = _checks(material, group)
+    material.context.notes.findings.extend(verdicts)
     material.context.notes.statements.extend(f"{verdict.line}." for verdict in verdicts)
     return Part(render("checks", verdicts=verdicts), title="Checks", name="checks")
 
 
-def _checks(material: ReportData, group: RunGroup) -> list[CheckResult]:
+def _checks(material: ReportData, group: RunGroup) -> list[Finding]:
     """Return the checks of a group with the labels of parts."""
     found = validity_checks(material.context, group)
-    return [CheckResult(check.passed, material.words.labelled(check.words)) for check in found]
+    return [replace(finding, text=material.words.labelled(finding.text)) for finding in found]
 
 
 def results_section(material: ReportData) -> Part:

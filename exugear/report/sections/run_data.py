@@ -327,7 +327,7 @@ def _mode_facts(material: ReportData, group: RunGroup, run: VariantRun, resonanc
         moves = material.words.labelled(resonance.finding.mode_name)
         return [["Mode", f"{resonance.finding.mode_frequency:.1f} Hz at this speed"], ["Mode shape", moves]]
     if modes is None and not group.responses:
-        return [["Mode", "no modes computed; run `exugear modes`"]]
+        return [["Mode", "no modes computed; run exugear modes"]]
     if mode is None or modes is None:
         return [["Mode", "none near"]]
     damping = 100.0 * float(modes["damping_ratio"][mode])

@@ -259,18 +259,18 @@ def _check(assembly: Assembly) -> None:
             "requires one: fix a body or couple two"
         )
     if not gearbox.meshes:
-        raise SteadyError("the gear train has no meshes and no excitation; use `exugear run` instead")
+        raise SteadyError("the gear train has no meshes and no excitation; use exugear run instead")
     if assembly.travelling.first.size:
         raise SteadyError(ELASTIC_RING)
     if gearbox.deviations:
         raise SteadyError(
             "deviations: pitch deviations and run-out excite at shaft orders, which the steady-state response does "
-            "not include; remove them, or use `exugear run`"
+            "not include; remove them, or use exugear run"
         )
     if gearbox.pin_offsets:
         raise SteadyError(
             "pins: position errors cause unequal planet loads that rotate with the carrier, which the steady-state "
-            "response cannot treat; remove them, or use `exugear run`"
+            "response cannot treat; remove them, or use exugear run"
         )
     # Rows of rolling elements must neither pass nor turn against the load that they carry.
     rolling = assembly.connectors.rolling
@@ -280,12 +280,12 @@ def _check(assembly: Assembly) -> None:
         if rolling.cage_ratio[n]:
             raise SteadyError(
                 f"bearings.{support.family}.cage = 'turning': ball-pass excitation, which the steady-state response "
-                "cannot treat; set cage = 'averaged', or use `exugear run`"
+                "cannot treat; set cage = 'averaged', or use exugear run"
             )
         if not load_stands_still(support, bodies):
             raise SteadyError(
                 f"bearings.{support.family}.model = 'iso16281': its elements rotate with {support.on} relative to the "
-                "load, which the steady-state response cannot treat; set model = 'linear', or use `exugear run`"
+                "load, which the steady-state response cannot treat; set model = 'linear', or use exugear run"
             )
 
 
@@ -429,7 +429,7 @@ def _checked_change(here: Floats, there: Floats, most: float) -> float:
     if change > most:
         raise SteadyError(
             f"the stiffness varies by {100.0 * change:.2g} % over a carrier revolution (unequal planets, or a support "
-            "that rotates with them), which the steady-state response cannot treat; use `exugear run` instead"
+            "that rotates with them), which the steady-state response cannot treat; use exugear run instead"
         )
     return change
 

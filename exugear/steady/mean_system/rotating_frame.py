@@ -117,12 +117,12 @@ def _check_spacing(family: str, planets: Sequence[Body]) -> None:
     if len(planets) < FEWEST:
         raise SteadyError(
             f"bodies.{family}: {len(planets)} planets; with fewer than {FEWEST} equally spaced planets the matrices "
-            "vary with the carrier angle, which the steady-state response cannot treat; use `exugear run` instead"
+            "vary with the carrier angle, which the steady-state response cannot treat; use exugear run instead"
         )
     if not equally_spaced(planets):
         raise SteadyError(
             f"bodies.{family}.planet_angles_deg: with unequally spaced planets the matrices vary with the carrier "
-            "angle, which the steady-state response cannot treat; use `exugear run` instead"
+            "angle, which the steady-state response cannot treat; use exugear run instead"
         )
 
 

@@ -31,7 +31,7 @@ def test_work_inside_of_other_work_adds_a_row_to_its_display(capsys):
     with bars.row() as later:
         later("run")
         assert bars.display() is not display
-    assert "steady state" in capsys.readouterr().err
+    assert capsys.readouterr().err == "", "a finished display disappears"
 
 
 def test_a_row_that_has_nothing_to_say_shows_nothing(capsys):

@@ -28,7 +28,7 @@ from ..cases.ring import ring_content
 from ..cases.spur import COARSE_INPUT, SPUR_CASE
 
 SHORT = ("--duration", 0.01)
-TWO_SPEEDS = ("--speeds", "1000:1010:2")
+TWO_SPEEDS = ("--speeds", "1000:1010", "--points", "2")
 COMMANDS: dict[str, tuple[object, ...]] = {
     "check": (),
     "ste": ("--positions", 8),
@@ -283,6 +283,8 @@ def test_the_steady_response_of_an_elastic_ring_is_refused_before_its_finite_ele
     checked = exugear("check", case, "--json")
     reason = json.loads(checked.stdout)["steady"]["flexible"]
     assert reason.startswith("the ring gear is flexible: stiffness varies with the carrier")
-    result = exugear("steady", case, "--variant", "flexible", "--speeds", "0:100:5", "--out", tmp_path / "results")
+    result = exugear(
+        "steady", case, "--variant", "flexible", "--speeds", "0:100", "--points", "5", "--out", tmp_path / "results"
+    )
     assert result.exit_code == 2 and one_line(reason) in one_line(result.stderr)
     assert not (tmp_path / "results").exists()

@@ -5,7 +5,8 @@ from __future__ import annotations
 import io
 import json
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,15 +16,17 @@ import typer
 import xarray as xr
 from rich.console import Console
 
-from exugear.cli import rating_tables, tables
+from exugear.cli import rating_tables, resonances, tables
 from exugear.cli.app import app
-from exugear.cli.tasks import bearings, check, life, loads, modes, report, ste, steady
+from exugear.cli.tasks import bearings, check, life, loads, modes, report, ste
 from exugear.cli.tasks import study as study_task
+from exugear.gearbox.gearbox import Gearbox
 from exugear.life.rating.sheet import FINITE_ELEMENTS, FlankSheet, RatingSheet
-from exugear.report.findings.ranking import PeakAmplitude, Resonance
+from exugear.report.findings.ranking import PeakAmplitude, Ranking, Resonance
 from exugear.report.writer import Report
 from tests.exugear.cases.command import exugear
 
+CASE = Path(__file__).parents[3] / "cases" / "grc750" / "gearbox.toml"
 COLUMNS = 79
 LINES = 40
 NAMES = [f"{stem}{n}".ljust(24, "x") for n, stem in enumerate(9 * ["intermediate_stage_"], start=1)]
@@ -69,14 +72,17 @@ def printed(monkeypatch: pytest.MonkeyPatch) -> Iterator[Printed]:
 
     print_table = tables.print_table
 
-    def spy(title: str, summaries: Iterable[Any], columns: Sequence[tables.Column], legend: str = "") -> None:
-        rows = [*summaries]
-        found.rows.append([{column.heading: column.cell(row) for column in columns} for row in rows])
-        print_table(title, rows, columns, legend)
+    def spy(table: tables.Table) -> None:
+        found.rows.append([{column.heading: column.cell(row) for column in table.columns} for row in table.rows])
+        print_table(table)
 
-    for module in (tables, rating_tables, bearings, check, life, loads, modes, report, ste, steady, study_task):
-        monkeypatch.setattr(module, "print_table", spy)
+    monkeypatch.setattr(tables, "print_table", spy)
     yield found
+
+
+def show(*shown: tables.Table, whole: bool = True, verdict: str = "Verdict") -> None:
+    """Print tables as a command does."""
+    tables.Outcome(verdict, {}, shown).show(as_json=False, whole=whole)
 
 
 def test_check(printed: Printed) -> None:
@@ -135,9 +141,10 @@ def test_check(printed: Printed) -> None:
         for name in NAMES
     ]
     summary = {"name": LONG, "ratio": -0.00123456, "pairs": pairs, "tooth_thickness": thicknesses, "forces": [force]}
-    check.print_check(LONG, {**summary, "load_cases": cases, "bearings": supports})
-    printed.check(6)
-    check.print_availability({"variants": {"flexible": " ".join(NAMES)}, "steady": {}, "life": {"life": []}})
+    show(*check.check_tables(LONG, {**summary, "load_cases": cases, "bearings": supports}))
+    printed.check(5)
+    known = {"variants": {"flexible": " ".join(NAMES)}, "steady": {}, "life": {"life": []}}
+    tables.Outcome("", {}, remarks=check.availability(known)).show(as_json=False, whole=True)
     assert max(map(len, printed.lines)) <= COLUMNS
 
 
@@ -148,8 +155,9 @@ def test_check_rating(printed: Printed) -> None:
         for gear in NAMES[:3]
         for sign in "+-"
     )
-    rating_tables.print_rating(RatingSheet("ISO 6336:2006", " ".join(NAMES), flanks, (), (), ()))
-    printed.check(1)
+    sheet = RatingSheet("ISO 6336:2006", " ".join(NAMES), flanks, (), (), ())
+    show(*rating_tables.rating_outcome(sheet, "gearbox.toml", LONG).tables)
+    printed.check(2)
 
 
 def test_ste(printed: Printed) -> None:
@@ -175,10 +183,11 @@ def test_ste(printed: Printed) -> None:
         }
         for name in NAMES
     ]
-    tables.print_table("Static transmission error", summaries, ste.ERRORS, ste.ERROR_LEGEND)
-    tables.print_table("Contact", summaries, ste.CONTACTS, ste.CONTACT_LEGEND)
-    tables.print_table("Reference", summaries, ste.REFERENCES, ste.REFERENCE_LEGEND)
-    printed.check(3)
+    show(
+        tables.Table("Static transmission error", summaries, ste.TABLES, ste.LEGEND, ste.DETAILS),
+        tables.Table("Reference", summaries, ste.REFERENCES, ste.REFERENCE_LEGEND),
+    )
+    printed.check(2)
 
 
 def test_bearings(printed: Printed) -> None:
@@ -208,8 +217,8 @@ def test_bearings(printed: Printed) -> None:
     }
     duties = [{**duty, "bearing": name} for name in NAMES]
     meshes = [{**mesh, "mesh": name} for name in NAMES]
-    bearings.print_bearings({"variant": "bushing", "bearings": duties, "meshes": meshes})
-    printed.check(3)
+    show(*bearings.bearing_tables({"variant": "bushing", "bearings": duties, "meshes": meshes}))
+    printed.check(2)
 
 
 def test_steady(printed: Printed) -> None:
@@ -219,11 +228,14 @@ def test_steady(printed: Printed) -> None:
         "acceleration": PeakAmplitude(1234.5, NAMES[1], 3456),
     }
     lines = [f"12 x {name} - 3 x {NAMES[0]} + 2 x {NAMES[1]}" for name in NAMES]
-    resonances = [Resonance(line, 123.456, -1234.5678, 12345.678, loudness).summary() for line in lines]
-    summary = {"resonances": resonances, "accelerations_of": "shafts and housing", "ranked_by": "force"}
-    steady.print_ranking("Resonances", summary)
-    printed.check(1)
-    assert "(3456)" in "\n".join(printed.lines)
+    found = tuple(Resonance(line, 123.456, -1234.5678, 12345.678, loudness) for line in lines)
+    ranking = Ranking(found, (0.1, 1234.5), False, "shafts and housing", quantity="force")
+    gearbox = Gearbox.from_toml(CASE)
+    for whole in (False, True):
+        show(resonances.resonance_table(gearbox, ranking, "bushing"), whole=whole)
+    printed.check(2)
+    assert "3456" in "\n".join(printed.lines)
+    assert "about -z" in "\n".join(printed.lines)
 
 
 def test_modes(printed: Printed) -> None:
@@ -246,8 +258,10 @@ def test_modes(printed: Printed) -> None:
             "name": "rigid-body rotation",
         },
     ]
-    modes.print_modes({"variant": "bushing", "mesh_model": "line_of_action", "inertias": LONG, "modes": rows})
-    printed.check(1)
+    summary = {"variant": "bushing", "mesh_model": "line_of_action", "inertias": LONG, "modes": rows}
+    for whole in (False, True):
+        show(modes.mode_table(summary, whole))
+    printed.check(2)
 
 
 def test_life(printed: Printed) -> None:
@@ -267,7 +281,7 @@ def test_life(printed: Printed) -> None:
         **dict.fromkeys(("failures", "assumptions", "unrated", "reliefs"), ()),
         "remarks": {LONG: ["load below the usual minimum load"]},
     }
-    life.print_life(summary, 20.0)
+    show(*life.life_tables(summary))
     assert "inf." in "\n".join(printed.lines)
     assert ">1e9" in "\n".join(printed.lines)
     printed.check(4)
@@ -289,26 +303,41 @@ def test_loads(printed: Printed) -> None:
     slopes = {f"{m:.4g}": 123.4567 for m in np.linspace(3.0, 12.0, 12)}
     summary = {"body": LONG, "life_years": 20.0, "hours": 175320.0, "revolutions": 1.234e12, "sources": [source]}
     summary |= {"equivalent_torque_kN_m": slopes, "equivalent_range_1_Hz_kN_m": slopes}
-    loads.print_loads({**summary, "hub_equivalent_range_1_Hz": {"moment_y_kN_m": slopes}, "parts": parts}, 1234)
+    hub = {"moment_y_kN_m": slopes}
+    show(*loads.load_tables({**summary, "hub_equivalent_range_1_Hz": hub, "parts": parts}, 1234))
     printed.check(4)
 
 
 def test_report(printed: Printed, tmp_path: Any) -> None:
     step = f"comparison with Exudyn, flexible, {', '.join(NAMES)}"
     (tmp_path / "times.jsonl").write_text(json.dumps({"step": step, "seconds": 123456.7, "memory": 1.234e11}) + "\n")
-    report._print_report(tmp_path, Report(tmp_path.relative_to(tmp_path), (), (), (), ()), None, False)
+    written = Report(tmp_path.relative_to(tmp_path), (), (), (), (), Gearbox.from_toml(CASE))
+    report._outcome(tmp_path, written, None).show(as_json=False, whole=True)
     printed.check(1)
 
 
 def test_study(printed: Printed, monkeypatch: pytest.MonkeyPatch) -> None:
-    tables.print_table("Sensitivity", [(NAMES[1], LONG, -1.23456)], study_task.SLOPES)
     dataset = xr.Dataset(
         {name: ("evaluation", np.full(1300, -1.2345e-123)) for name in NAMES}
         | {"on_front": ("evaluation", np.ones(1300, dtype=int))}
     )
     study: Any = SimpleNamespace(file=SimpleNamespace(parameters=NAMES[2:]), tolerances=None)
     monkeypatch.setattr(study_task, "_judged", lambda _: NAMES[:2])
-    study_task._print_front(study, dataset)
+    show(
+        tables.Table("Sensitivity", [(NAMES[1], LONG, -1.23456)], study_task.SLOPES),
+        study_task._front(study, dataset),
+    )
+    printed.check(2)
+
+
+def test_points_of_a_study(printed: Printed) -> None:
+    values = np.full(12, -1.2345e-123)
+    data = xr.Dataset(dict.fromkeys((*NAMES, "seconds"), ("seat", values)), {"seat": ("seat", np.arange(12.0))})
+    table = study_task.point_table(data, ["seat"], ["seat"], NAMES)
+    show(table, whole=False)
+    assert len(printed.rows[0]) == tables.SHOWN_ROWS and len(printed.rows[0][0]) == study_task.SHOWN_COLUMNS
+    assert printed.lines[-1] == "2 more points, 4 more columns: --all"
+    show(table)
     printed.check(2)
 
 
@@ -326,7 +355,7 @@ def test_the_list_of_commands_is_not_cut() -> None:
 
 def test_names_are_wrapped_and_numbers_are_not(printed: Printed) -> None:
     rows = [{"a": LONG, "b\nmm": "1234.5", "c": f"{LONG} and more of {LONG}"}]
-    tables.print_table("Title", rows, [tables.Column(key, key, is_text=key == "c") for key in rows[0]])
+    show(tables.Table("Title", rows, [tables.Column(key, key, is_text=key == "c") for key in rows[0]]))
     printed.check(1)
     assert tables.wrapped(LONG, 12) == ["intermediate", "_stage_1xxxx"]
 
@@ -341,7 +370,7 @@ def test_a_column_converts_units_and_names_unknown_and_infinite_values(printed: 
         {"part": "a", "load_N": 12345.6, "turns": float("inf")},
         {"part": "b", "load_N": None, "turns": float("nan")},
     ]
-    tables.print_table("Title", rows, columns)
+    show(tables.Table("Title", rows, columns))
     assert printed.rows == [
         [{"part": "a", "load\nkN": "12.35", "life\nh": "inf."}, {"part": "b", "load\nkN": "-", "life\nh": "none"}]
     ]

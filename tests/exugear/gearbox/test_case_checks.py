@@ -147,7 +147,7 @@ def test_a_differential_has_modes_and_runs_and_no_steady_response(
     file.write_text(toml_text(dict(gearbox.content)), encoding="utf-8")
     how = ("--variant", "rigid", "--mesh-model", "iso6336", "--out", tmp_path / "out")
     assert exugear("run", file, *how, "--duration", 0.02).exit_code == 0
-    outcome = exugear("steady", file, *how, "--speeds", "10:20:2")
+    outcome = exugear("steady", file, *how, "--speeds", "10:20", "--points", "2")
     assert (outcome.exit_code, "2 degrees of freedom" in outcome.stderr) == (2, True)
 
 

@@ -105,7 +105,7 @@ def _example(rename: Rename) -> dict:
 
 @pytest.mark.parametrize("rename", GEARBOX_RENAMES, ids=lambda rename: f"{rename.table}.{rename.old}")
 def test_an_old_key_of_a_gearbox_is_refused_with_the_new_one(rename):
-    with pytest.raises(GearboxFileError, match=rf"{rename.old}.*was renamed to {rename.new}; `exugear migrate FILE"):
+    with pytest.raises(GearboxFileError, match=rf"{rename.old}.*was renamed to {rename.new}; exugear migrate FILE"):
         parse_case(_example(rename), "my.toml")
 
 

@@ -103,7 +103,7 @@ def test_check_tells_thickness_span_and_backlash(tmp_path: Path):
     path.write_text(
         f"{head}tooth_thickness = {{ upper_allowance_um = -50, tolerance_um = 30 }} #{tail}", encoding="utf-8"
     )
-    told = exugear("check", path)
+    told = exugear("check", path, "--all")
     assert told.exit_code == 0, told.output
     assert "Tooth thickness within its allowances" in told.output
     assert "base tangent" in told.output

@@ -86,11 +86,11 @@ def test_words_say_that_figures_are_of_constant_speed_and_name_the_mode_without_
         "Source: constant speed, time-varying stiffness",
         "On bearings, inertia set disc, constant speed, time-varying stiffness",
         "Radial forces on bearings, constant speed, time-varying stiffness",
-        "No run-up; run `exugear run`",
+        "No run-up; run exugear run",
         "energy balance closed to",
     ):
         assert words in page, words
-    assert "no modes computed; run `exugear modes` for mode shapes" not in page
+    assert "no modes computed; run exugear modes for mode shapes" not in page
     assert "window-dependent" not in page.partition('id="trust"')[0]
 
 
@@ -119,12 +119,12 @@ def test_with_run_ups_beside_them_both_sources_can_be_chosen(folder, tmp_path):
     simulated(gearbox, Choice("bushing", LAW, load_case="run_up"), stiffness, both)
     report = write_report(both)
     groups = data_of(report.path)["groups"]
-    assert [group["source"] for group in groups] == ["constant speed, time-varying stiffness", "run-up run up"]
+    assert [group["source"] for group in groups] == ["constant speed, time-varying stiffness", "run-up run_up"]
     assert 'id="group"' in report.path.read_text(encoding="utf-8")
     # The command line leads with constant speed; the run-up follows under its own name.
     assert len([line for line in report.statements if line.startswith("Highest resonance")]) == 1
     assert (
-        len([line for line in report.statements if line.startswith("Run-up run up: Highest transmission error")]) == 1
+        len([line for line in report.statements if line.startswith("Run-up run_up: Highest transmission error")]) == 1
     )
 
 

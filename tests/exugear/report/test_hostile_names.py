@@ -196,7 +196,7 @@ def printed(line: Any, monkeypatch: pytest.MonkeyPatch, width: int = 80) -> str:
 def test_tables_and_bars_show_text_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     rows = [{"pair": f"{MARKUP} {STEERING}", "what": "[/]"}]
     columns = (tables.Column("pair", "pair"), tables.Column("what", "what", is_text=True))
-    shown = printed(lambda: tables.print_table(MARKUP, rows, columns), monkeypatch, 200)
+    shown = printed(lambda: tables.print_table(tables.Table(MARKUP, rows, columns)), monkeypatch, 200)
     assert shown.count(MARKUP) == 2
     assert tame(shown)
 

@@ -133,4 +133,4 @@ def test_a_gearbox_file_without_results_names_their_folder(tmp_path, monkeypatch
     monkeypatch.chdir(tmp_path)
     missing = exugear("report", case_in(tmp_path))
     assert missing.exit_code == 2
-    assert "results/my: no such folder; specify the results folder of `exugear run`" in missing.stderr
+    assert "results/my: no such folder; specify the results folder of exugear run" in missing.stderr

@@ -65,7 +65,7 @@ def test_the_page_stands_alone_and_names_its_assumptions(results):
     assert "default-src 'none'" in page
     for words in (
         "Resonance ranking",
-        "Run-up run up, mesh stiffness over the mesh cycle, inertia set disc, housing stiffness factor 0.5",
+        "Run-up run_up, mesh stiffness over the mesh cycle, inertia set disc, housing stiffness factor 0.5",
         "no peak of 3 dB prominence on the same order within the resolution",
         "a step of the test",
         "Hann window",
@@ -83,7 +83,7 @@ def test_the_page_stands_alone_and_names_its_assumptions(results):
 def test_cards_and_checks_on_the_page_are_the_sentences_of_the_command_line(results):
     report = write_report(results, target=1000.0)
     page = html.unescape(report.path.read_text(encoding="utf-8"))
-    kinds = ("Highest resonance: ", "Run-up run up: Highest", "Run-up run up: Effect")
+    kinds = ("Highest resonance: ", "Run-up run_up: Highest", "Run-up run_up: Effect")
     facts = [line for line in report.statements if line.startswith(kinds)]
     assert len(facts) == 3
     for line in facts[1:]:

@@ -209,10 +209,10 @@ def test_a_search_over_tolerances_that_is_begun_again_computes_nothing_twice(tmp
     ("changes", "words"),
     [
         ({"optimise": {"minimise": ["f"], "limits": {"g": {"min": 1.0}}}}, "optimise.limits: no result 'g'"),
-        ({"optimise": {"minimise": ["f"], "limits": {"f": {}}}}, "set `min`, `max` or both"),
+        ({"optimise": {"minimise": ["f"], "limits": {"f": {}}}}, "set min, max or both"),
         (
             {"optimise": {"minimise": ["f"], "limits": {"f": {"min": 2.0, "max": 1.0}}}},
-            "`min` must not be above `max`",
+            "min must not be above max",
         ),
         ({"optimise": {"minimise": ["f"], "limits": {"f": {"min": float("nan")}}}}, "finite number"),
         ({"optimise": {"minimise": ["f", "f"]}}, "f is listed twice; set two different results, or one"),

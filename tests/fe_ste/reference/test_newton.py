@@ -235,7 +235,7 @@ def test_a_body_that_nothing_holds_is_named_with_load_step_and_iteration(block):
 
 
 def test_overlap_at_the_start_is_refused_with_its_place(block):
-    with pytest.raises(EquilibriumError, match=r"overlap by 50 um at the start, near \(.*\) mm"):
+    with pytest.raises(EquilibriumError, match=r"overlap by 50 µm at the start, near \(.*\) mm"):
         solve_contact(stacked_blocks(block, True, lift=-50e-6))
 
 

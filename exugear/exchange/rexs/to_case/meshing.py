@@ -573,7 +573,7 @@ def _blanks(
         amounts = [side[kind].quantity(kind) for side in (left, right) if kind in side]
         if part is None or not any(amounts):
             continue
-        said = ", ".join(dict.fromkeys(f"{_um(amount):g} um" for amount in amounts if amount))
+        said = ", ".join(dict.fromkeys(f"{_um(amount):g} µm" for amount in amounts if amount))
         notes.changed.append(
             f"{part} of {gear.part}: its amount of {said} is not imported, since REXS does not define at which end a "
             f"positive value removes material; set {key} in [gears.NAME.modification]"

@@ -275,7 +275,7 @@ def _approached(row: Row, approach: float) -> Row:
     sine = math.sin(angle) + approach / row.groove_distance
     if not 0.0 <= sine < 1.0:
         raise BearingError(
-            f"bearing pair: axial_preload = {2e6 * approach:g} um moves the grooves of balls of "
+            f"bearing pair: axial_preload = {2e6 * approach:g} µm moves the grooves of balls of "
             f"{1e3 * row.element_diameter:g} mm past each other; it must be smaller"
         )
     turned = math.asin(sine)

@@ -194,8 +194,8 @@ def test_a_slope_whose_sign_is_not_known_becomes_a_zero_to_be_set(kind: str, key
     lines = [line for line in made.text.splitlines() if line.startswith(key)]
     told = [line for line in made.changed if kind in line]
     if amount:
-        assert "SET IT: 12 um" in lines[0]
-        assert ": its amount of 12 um is not imported, since REXS does not" in told[0]
+        assert "SET IT: 12 µm" in lines[0]
+        assert ": its amount of 12 µm is not imported, since REXS does not" in told[0]
     else:
         assert not lines
         assert not told

@@ -131,7 +131,7 @@ def test_check_asks_about_the_sign_of_a_torque_that_loads_the_other_flanks(tmp_p
         "spur loaded on the opposite flank of the static load, at which tables, stiffness and phases are computed"
         in outcome.stderr
     )
-    assert "spur -!" in outcome.stdout
+    assert "spur -!" in checked(tmp_path, "{ shaft_1 = -100.0, shaft_2 = -140.0 }", "--all").stdout
     row = json.loads(checked(tmp_path, "{ shaft_1 = -100.0, shaft_2 = -140.0 }", "--json").stdout)["load_cases"][0]
     assert (row["reversed_flanks"], row["loaded_flanks"]) == (["spur"], {"spur": "-"})
 

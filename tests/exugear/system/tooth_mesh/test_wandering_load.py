@@ -50,7 +50,18 @@ def test_the_load_of_helical_teeth_moves_along_them_as_their_contact_has_it(tmp_
 def test_steady_says_that_the_moment_is_left_out_and_how_much_that_is(tmp_path):
     case = tmp_path / "pair.toml"
     case.write_text(template("pair"), encoding="utf-8")
-    usual = ["steady", str(case), "--out", str(tmp_path / "out"), "--variant", "bushing", "--speeds", "500:1500:4"]
+    usual = [
+        "steady",
+        str(case),
+        "--out",
+        str(tmp_path / "out"),
+        "--variant",
+        "bushing",
+        "--speeds",
+        "500:1500",
+        "--points",
+        "4",
+    ]
     asked = [*usual, "--mesh-model", "tangential"]
     told = exugear(*asked)
     assert told.exit_code == 0, told.stderr
@@ -68,5 +79,16 @@ def test_steady_says_that_the_moment_is_left_out_and_how_much_that_is(tmp_path):
 def test_steady_says_nothing_where_the_load_stays(tmp_path):
     case = tmp_path / "spur.toml"
     case.write_text(SPUR_CASE, encoding="utf-8")
-    asked = ["steady", str(case), "--out", str(tmp_path / "out"), "--variant", "bushing", "--speeds", "500:1500:4"]
+    asked = [
+        "steady",
+        str(case),
+        "--out",
+        str(tmp_path / "out"),
+        "--variant",
+        "bushing",
+        "--speeds",
+        "500:1500",
+        "--points",
+        "4",
+    ]
     assert ": load centroid shuttles by ±" not in " ".join(exugear(*asked).stderr.split())

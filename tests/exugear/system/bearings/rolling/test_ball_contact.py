@@ -291,5 +291,5 @@ def test_deep_grooves_hold_both_directions(axial):
 
 
 def test_preload_that_moves_grooves_past_each_other_is_refused():
-    with pytest.raises(BearingError, match="axial_preload = 2000 um moves the grooves"):
+    with pytest.raises(BearingError, match="axial_preload = 2000 µm moves the grooves"):
         pair_rows(ANGULAR, "O", 0.03, 2e-3)

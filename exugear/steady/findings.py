@@ -1,0 +1,142 @@
+"""Findings on a stored steady-state response: where it is missing, unstable or outside the range of its models."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from exugear.gearbox.units import RPM
+from exugear.results.findings import Finding, check_finding
+from exugear.steady.peaks import STRAINED, bearing_swings, pulls
+from exugear.system.tooth_mesh.laws.registry import LAWS
+from exugear.system.tooth_mesh.tables import Shuttling
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+MAX_ENERGY_ERROR = 1e-4
+"""Permissible relative difference between dissipated power and power of the meshes."""
+NOTICED_CHANGE = 1e-2
+"""Relative change of the highest peaks with more harmonics above which a warning is given."""
+NOTICED_VARIATION = 1e-3
+"""Relative variation of stiffness with the carrier angle above which a warning is given."""
+NOTICED_SHUTTLING = 0.3
+"""Ratio of shuttling moment to transmission error excitation above which a warning is given."""
+LEAST_AMPLITUDE = 1e-12
+"""Amplitude of the overall transmission error below which a response is round-off, m."""
+SHOWN_BEARINGS = 4
+
+
+def response_findings(data: xr.Dataset) -> tuple[Finding, ...]:
+    """Check a response.
+
+    Parameters
+    ----------
+    data : as `exugear.steady.steady_file.load_response` reads it
+    """
+    return (*_balance(data), *_speeds(data), *_models(data), *_excitation(data))
+
+
+def is_excited(data: xr.Dataset) -> bool:
+    """Whether anything vibrates: the mesh stiffness varies over the mesh cycle."""
+    return bool((data["amplitude"][:, 1:, 0] > LEAST_AMPLITUDE).any())
+
+
+def _rpm(speed: float) -> str:
+    """Return a speed (rad/s) in three digits, without exponent."""
+    return f"{float(f'{abs(speed) / RPM:.3g}'):g} rpm"
+
+
+def _balance(data: xr.Dataset) -> Iterator[Finding]:
+    """Energy and stability of the steady state."""
+    error = float(np.nanmax(data["energy_error"]))
+    text = f"energy balance closed to {100.0 * error:.1g} % (power supplied by the meshes = power dissipated)"
+    yield check_finding(error < MAX_ENERGY_ERROR, text, error)
+    growth = float(data.attrs["growth_rate"])
+    if growth <= 0.0:
+        yield Finding(
+            "passed", f"the steady state is stable: disturbances decay at {-growth:.2g} 1/s or faster", growth
+        )
+        return
+    at = data["speed"].to_numpy()[data["growth"].to_numpy() == growth]
+    where = f" (at {_rpm(at[0])})" if at.size else ""
+    text = f"the steady state is unstable: disturbances grow at up to {growth:.3g} 1/s{where}"
+    yield Finding("warning" if bool(data["growth"].notnull().any()) else "error", text, growth)
+
+
+def _speeds(data: xr.Dataset) -> Iterator[Finding]:
+    """Speeds without a state, and speeds with a remark."""
+    if ended := str(data.attrs["branch_ended"]):
+        yield Finding("error", f"continuation incomplete: {ended}")
+    if missing := json.loads(data.attrs["not_converged"]):
+        first = f"{_rpm(missing[0]['speed'])}: {missing[0]['reason']}"
+        text = f"no steady state found at {len(missing)} speeds (blank in the diagrams), first {first}"
+        yield Finding("warning", text, len(missing))
+    remarks = [(speed, str(text)) for speed, text in zip(data["speed"].values, data["remark"].values, strict=True)]
+    if said := [(speed, text) for speed, text in remarks if text]:
+        first = f"{_rpm(said[0][0])}: {said[0][1]}"
+        yield Finding("warning", f"{len(said)} speeds with warnings, first {first}", len(said))
+
+
+def _models(data: xr.Dataset) -> Iterator[Finding]:
+    """Range of the models of meshes, bearings and planets."""
+    model = str(data.attrs["mesh_model"])
+    for pull in () if LAWS[model].loses_contact else pulls(data):
+        text = f"{pull.mesh}: tensile mesh force at {pull.count} of {data.sizes['point']} speeds, at most "
+        text += f"{100.0 * pull.share:.2g} % of the time at {_rpm(pull.speed)}; amplitudes there are invalid, because "
+        text += f"the model {model} neglects contact loss; use --mesh-model table --method nonlinear"
+        yield Finding("warning", text, pull.share)
+    apart = float(np.nanmax(data["contact_loss_fraction"], initial=0.0))
+    if apart > 0.0:
+        text = f"contact loss for up to {100.0 * apart:.2g} % of the time (included in the mesh model)"
+        yield Finding("passed", text, apart)
+    if names := str(data.attrs["bearings_in_time"]):
+        yield Finding("note", f"nonlinear bearings (rolling elements evaluated in time): {names}")
+    elif "16281" in data.attrs["bearing_laws"]:
+        text = "nonlinear bearings are linearised at the static load; --method nonlinear evaluates the nonlinear model"
+        yield Finding("note", text)
+    if swings := bearing_swings(data):
+        loads = [f"{own.bearing} {100.0 * own.share:.0f} % at {_rpm(own.speed)}" for own in swings[:SHOWN_BEARINGS]]
+        more = f"; and {len(swings) - SHOWN_BEARINGS} more" if len(swings) > SHOWN_BEARINGS else ""
+        text = (
+            f"dynamic load of bearings over {100.0 * STRAINED:.0f} % of their static load ({'; '.join(loads)}{more}): "
+        )
+        text += 'outside the linear range, peaks there are too high; set model = "iso16281" and use --method nonlinear'
+        yield Finding("warning", text, swings[0].share)
+    variation = float(data.attrs["stiffness_variation"])
+    if variation > NOTICED_VARIATION:
+        text = f"stiffness varies by {100.0 * variation:.2g} % over a carrier revolution (unequal planet loads); the "
+        text += "mean is used, and responses near lightly damped planet modes are off by a few thousandths"
+        yield Finding("warning", text, variation)
+
+
+def _excitation(data: xr.Dataset) -> Iterator[Finding]:
+    """Excitation by the meshes, and its truncation."""
+    if not is_excited(data):
+        text = f"no excitation: the mesh model {data.attrs['mesh_model']} has constant stiffness over the mesh cycle, "
+        yield Finding("warning", f"{text}and all amplitudes are zero; use --mesh-model line_of_action")
+        return
+    harmonics = int(data.attrs["harmonics"])
+    change = float(data.attrs["change_with_more"])
+    if math.isfinite(change):
+        text = f"{harmonics} mesh harmonics ({math.ceil(1.5 * harmonics)} would change the ten highest peaks by at "
+        text += f"most {100.0 * change:.1g} %)"
+        yield Finding("warning" if change > NOTICED_CHANGE else "note", text, change)
+    else:
+        yield Finding("note", f"{harmonics} mesh harmonics; harmonics that a solution requires are added")
+    if shared := str(data.attrs["shared_lines"]):
+        yield Finding("note", f"coinciding orders of several meshes, each named after one of them: {shared}")
+
+
+def shuttling_findings(shuttling: tuple[Shuttling, ...], mesh_model: str) -> tuple[Finding, ...]:
+    """Return a warning if a mesh model neglects shuttling that excites notably, largest first."""
+    if not shuttling or shuttling[0].over_error <= NOTICED_SHUTTLING:
+        return ()
+    text = f"{shuttling[0].description}. The shuttling moment, {shuttling[0].over_error:.2g} times the excitation by "
+    text += f"the transmission error, is neglected by the mesh model {mesh_model}; resonances with tilting gears may "
+    text += "be many times higher; use --mesh-model line_of_action"
+    return (Finding("warning", text, shuttling[0].over_error),)
