@@ -206,7 +206,7 @@ def _response_rows(
 ) -> list[dict[str, object]]:
     """Return the rows of resonances with all quantities and their ranks."""
     largest: dict[str, float] = {}
-    for own in listed:
+    for own in (own for own in listed if own.inside):
         for name, amplitude in (own.resonance.amplitudes if own.resonance else {}).items():
             largest[name] = max(largest.get(name, 1e-300), amplitude.amplitude)
     rows = []
@@ -218,7 +218,7 @@ def _response_rows(
             label = QUANTITIES[name]
             value = label.factor * amplitude.amplitude
             caveat = "; ".join(map(material.words.labelled, own.caveats)) if name == ranking.quantity else ""
-            bar = amplitude.amplitude / largest[name]
+            bar = amplitude.amplitude / largest.get(name, math.inf)  # one that is higher outside has a full bar
             cell = Cell(rounded_text(value), value, bar=bar, kind=name, caveat=caveat)
             row[f"{label.column} ± / {label.unit}"] = cell
             if name != ranking.quantity:  # its rank is the number
