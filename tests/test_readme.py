@@ -66,6 +66,7 @@ def test_a_gearbox_of_ones_own_goes_from_file_to_report(tmp_path: Path, monkeypa
     assert [words[0] for words in lines] == ["new", "run", "report"]
     for words in lines:
         more = ["--duration", "0.05"] if words[0] == "run" else []
+        more += ["--all"] if words[0] == "report" else []
         outcome = CliRunner().invoke(app, [*words, *more])
         assert outcome.exit_code == 0, outcome.output
     results = tmp_path / "results" / "my"
