@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
     from exugear.transient.outcome import Run
     from exugear.transient.runup import simulate
-    from fe_ste.tools.drawing import paper_axes
 
 #: Public names and their modules.
 _HOMES = {
@@ -59,7 +58,6 @@ _HOMES = {
     "load_study": "exugear.studies.dataset",
     "mesh_stiffness": "exugear.system.tooth_mesh.laws.stiffness",
     "order_lines": "exugear.results.spectra.waterfall",
-    "paper_axes": "fe_ste.tools.drawing",
     "plot_campbell": "exugear.report.pictures.diagrams",
     "plot_response": "exugear.report.pictures.diagrams",
     "plot_waterfalls": "exugear.results.spectra.diagrams",
@@ -95,7 +93,6 @@ __all__ = [
     "load_study",
     "mesh_stiffness",
     "order_lines",
-    "paper_axes",
     "plot_campbell",
     "plot_response",
     "plot_waterfalls",
