@@ -8,7 +8,7 @@ Versions of tables are in `fe_ste.tools.versions`.
 from __future__ import annotations
 
 #: Reduced flexible bodies (`exugear.system.bodies`), which runs and modes use.
-REDUCTION = 1
+REDUCTION = 2
 #: Eigenmodes (`exugear.system.modes`, and the models and matrices of `exugear.system.system`).
 MODES = 5
 #: Runs in time (`exugear.transient`, both solvers, the models, signals and filters).
