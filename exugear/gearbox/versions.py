@@ -16,6 +16,6 @@ RUN = 11
 #: Life of gears and bearings (`exugear.life`, and the root stress of `fe_ste.root_stress`).
 LIFE = 10
 #: Steady-state responses (`exugear.steady`, and all methods that modes use).
-STEADY = 15
+STEADY = 16
 #: Points of studies (`exugear.studies`: their outputs; the methods that these use have their own versions).
 STUDY = 4

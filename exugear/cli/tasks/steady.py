@@ -14,6 +14,7 @@ import xarray as xr
 from exugear.cli.case import assembled_by_iso, check_friction, steady_lack
 from exugear.cli.console import BadInputError, FailedError, not_converged_failure
 from exugear.cli.resonances import highest_resonance, resonance_table
+from exugear.cli.sound_tables import sound_line, sound_tables
 from exugear.cli.tables import Outcome, significant
 from exugear.cli.watched import WatchedProject
 from exugear.gearbox.gearbox import Gearbox
@@ -22,6 +23,7 @@ from exugear.gearbox.units import RPM
 from exugear.project import Project
 from exugear.report.findings.ranking import Ranking, ranking_of
 from exugear.results.findings import Finding
+from exugear.results.sound.over_speed import sound_over_speed
 from exugear.steady.findings import LEAST_AMPLITUDE, is_excited, response_findings, shuttling_findings
 from exugear.steady.peaks import bearing_swings, peaks, pulls
 from exugear.steady.settings import (
@@ -79,11 +81,16 @@ def steady(project: WatchedProject, settings: SteadySettings, quantity: str | No
     shuttling = neglected_shuttling(project)
     ranking = ranking_of(data, wanted=quantity or gearbox.case.report.quantity)
     summary = summarise(project, settings, data, shuttling, ranking)
+    sound = summary["sound"]
+    verdict = highest_resonance(ranking) if summary["excited"] else "No excitation"
     near = [mesh for mesh in str(data.attrs["near_unconverged_states"]).split(", ") if mesh]
     Outcome(
-        verdict=highest_resonance(ranking) if summary["excited"] else "No excitation",
+        verdict=f"{verdict}\n{sound_line(sound)}" if sound else verdict,
         summary=summary,
-        tables=[resonance_table(gearbox, ranking, f"{summary['variant']}, {summary['method']}")],
+        tables=[
+            resonance_table(gearbox, ranking, f"{summary['variant']}, {summary['method']}"),
+            *(sound_tables(sound) if sound else ()),
+        ],
         findings=[
             *response_findings(data),
             *ranking.findings,
@@ -151,6 +158,7 @@ def summarise(
             for peak in peaks(data)
             if peak.amplitude > LEAST_AMPLITUDE
         ],
+        "sound": _sound(data, ranking) if excited else None,
         "file": str(project.steady_path(settings)),
         "neglected_shuttling": [
             {"pair": pair.pair, "load_centroid_m": pair.amplitude, "over_transmission_error": pair.over_error}
@@ -181,6 +189,12 @@ def _left_out(data: xr.Dataset) -> dict[str, float]:
     """Neglected fraction of the compliance variation of each mesh, above the harmonics; planets by their family."""
     shares = zip(data["mesh_wave"].values, data["left_out"].values, strict=True)
     return {str(wave): float(share) for wave, share in shares if " " not in str(wave)}
+
+
+def _sound(data: xr.Dataset, ranking: Ranking) -> dict[str, Any] | None:
+    """Return the loudest speed among those that are ranked; None without an elastic housing."""
+    sound = sound_over_speed(data)
+    return None if sound is None else sound.inside(ranking.speeds).summary()
 
 
 def _known(value: float) -> float | None:

@@ -36,14 +36,27 @@ SAME_SPEED_TOLERANCE = 0.01
 """Relative speed difference within which peaks of one order in several quantities are one resonance."""
 MIN_RELATIVE_PEAK = 1e-9
 """Peaks below this fraction of the largest peak of their quantity are round-off."""
-MIN_EXCITED = {"error": 1e-12, "force": 1e-6, "acceleration": 1e-9, "mount_acceleration": 1e-9}
+MIN_EXCITED = {
+    "error": 1e-12,
+    "force": 1e-6,
+    "acceleration": 1e-9,
+    "mount_acceleration": 1e-9,
+    "surface_velocity": 1e-12,
+}
 """Amplitudes below which nothing is excited, in the units of the quantities."""
-UNIT_KEYS = {"error": "m", "force": "N", "acceleration": "m_per_s2", "mount_acceleration": "m_per_s2"}
+UNIT_KEYS = {
+    "error": "m",
+    "force": "N",
+    "acceleration": "m_per_s2",
+    "mount_acceleration": "m_per_s2",
+    "surface_velocity": "m_per_s",
+}
 """Units in the keys of ``--json``."""
 DECIDING = {
     "transmission_error": ("error",),
     "bearing_force": ("force",),
     "acceleration": ("mount_acceleration", "acceleration"),
+    "sound_power": ("surface_velocity",),
 }
 """Quantities by their name in a gearbox file; the first that is available decides."""
 USUAL = ("mount_acceleration", "force", "error")
@@ -107,8 +120,8 @@ class Resonance:
     frequency: float
     """Hz."""
     amplitudes: Mapping[str, PeakAmplitude]
-    """By quantity: ``error`` (m); with bearings ``force`` (N) and ``acceleration`` (m/s2); with mounts of a flexible
-    housing ``mount_acceleration`` (m/s2)."""
+    """By quantity: ``error`` (m); with bearings ``force`` (N) and ``acceleration`` (m/s2); with a flexible housing
+    ``surface_velocity`` (m/s), whose square is the sound power, and with its mounts ``mount_acceleration`` (m/s2)."""
 
     @property
     def best(self) -> int:
@@ -244,8 +257,8 @@ def resonances(data: xr.Dataset, quantity: str | None = None) -> pd.DataFrame:
     Parameters
     ----------
     data : result of `exugear.project.Project.steady` or `exugear.steady.steady_file.steady_response`
-    quantity : ``transmission_error``, ``bearing_force`` or ``acceleration``, by which they are sorted; by default the
-        acceleration at the mounts of a flexible housing, or else the bearing force
+    quantity : ``transmission_error``, ``bearing_force``, ``acceleration`` or ``sound_power``, by which they are sorted;
+        by default the acceleration at the mounts of a flexible housing, or else the bearing force
 
     Returns
     -------

@@ -7,7 +7,7 @@ grid of voxels from its corner: a point of the surface is outside if the first f
 
 With peak amplitudes q of the coordinates of the reduced body at the angular frequency w, the mean square of the normal
 velocity over the outer surface is w^2 q^H E q / (2 area). The equivalent radiated power (ERP) follows from it, see
-`exugear.steady.mean_system.radiated_power`.
+`exugear.results.sound.radiated_power`.
 """
 
 from __future__ import annotations
