@@ -28,8 +28,8 @@ def sound_line(sound: Mapping[str, Any]) -> str:
         return f"No sound power up to {significant(sound['limit_Hz'])} Hz"
     first = sound["orders"][0]
     return (
-        f"Highest sound power {sound['level_dBA']:.1f} dB(A), upper estimate: {_speed(sound)} rpm, most at "
-        f"{FREQUENCY.cell(first)} Hz, {ORDER.cell(first)}, {first['level_dBA']:.1f} dB(A)"
+        f"Highest sound power {sound['level_dBA']:.1f} dB(A), upper estimate: {_speed(sound)} rpm, "
+        f"{first['level_dBA']:.1f} dB(A) of it at {FREQUENCY.cell(first)} Hz, {ORDER.cell(first)}"
     )
 
 

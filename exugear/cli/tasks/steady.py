@@ -35,6 +35,7 @@ from exugear.steady.settings import (
     check_speeds,
     usual_speeds,
 )
+from exugear.system.bearings.stiffness import elastic_names
 from exugear.system.modal_damping import damping_in_words
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from exugear.system.tooth_mesh.tables import Shuttling, shuttling_pairs
@@ -67,6 +68,19 @@ def settings_of_options(
     return SteadySettings(speeds, method, harmonics, branches=branches)
 
 
+def check_radiating_body(project: Project) -> None:
+    """Refuse a ranking by sound power without a flexible housing, before anything is computed."""
+    gearbox = project.gearbox
+    fixed = {
+        body.name for body in gearbox.bodies() if body.fixed and gearbox.case.bodies[body.family].solid is not None
+    }
+    if not (project.choice.variant.is_elastic and fixed & set(elastic_names(gearbox))):
+        raise BadInputError(
+            f"--quantity sound_power: the variant {project.choice.variant} has no flexible housing; use --variant "
+            'flexible, and give a fixed body a [bodies.NAME.solid] table and flexibility = "elastic"'
+        )
+
+
 def steady(project: WatchedProject, settings: SteadySettings, quantity: str | None, as_json: bool, whole: bool) -> None:
     """Compute, store and print the response of a project."""
     gearbox = project.gearbox
@@ -74,6 +88,8 @@ def steady(project: WatchedProject, settings: SteadySettings, quantity: str | No
     with suppress(FailedError):  # such a failure does not apply to the selected mesh model
         if reason := steady_lack(assembled_by_iso(gearbox, project.choice.variant), project.choice.variant):
             raise BadInputError(reason)
+    if quantity == "sound_power":
+        check_radiating_body(project)
     check_friction(gearbox, project.choice.mesh_model)
     project.begin()
     project.prepare()
@@ -82,10 +98,10 @@ def steady(project: WatchedProject, settings: SteadySettings, quantity: str | No
     ranking = ranking_of(data, wanted=quantity or gearbox.case.report.quantity)
     summary = summarise(project, settings, data, shuttling, ranking)
     sound = summary["sound"]
-    verdict = highest_resonance(ranking) if summary["excited"] else "No excitation"
     near = [mesh for mesh in str(data.attrs["near_unconverged_states"]).split(", ") if mesh]
     Outcome(
-        verdict=f"{verdict}\n{sound_line(sound)}" if sound else verdict,
+        verdict=highest_resonance(ranking) if summary["excited"] else "No excitation",
+        further=[sound_line(sound)] if sound else [],
         summary=summary,
         tables=[
             resonance_table(gearbox, ranking, f"{summary['variant']}, {summary['method']}"),

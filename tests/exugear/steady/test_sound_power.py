@@ -26,6 +26,8 @@ from exugear.transient.compiled.solver import CompiledSystem
 from ...optional_libraries import needs_meshio
 from ..cases.assembled import assembled
 from ..cases.box import box_content
+from ..cases.command import exugear
+from ..cases.spur import SPUR_CASE
 
 pytestmark = needs_meshio
 
@@ -169,3 +171,11 @@ def test_power_of_surface_velocities_in_a_run_is_that_of_the_steady_orders(house
                 total += np.square(own @ rows.T) @ size
         powers.append(AIR_IMPEDANCE * total.mean())
     assert 10.0 * math.log10(np.mean(powers) / expected) == pytest.approx(0.0, abs=0.3)
+
+
+def test_a_ranking_by_sound_power_without_a_flexible_housing_is_refused(tmp_path):
+    file = tmp_path / "spur.toml"
+    file.write_text(SPUR_CASE, encoding="utf-8")
+    outcome = exugear("steady", file, "--mesh-model", "line_of_action", "--quantity", "sound_power")
+    assert outcome.exit_code == 2
+    assert "--quantity sound_power: the variant bushing has no flexible housing" in " ".join(outcome.stderr.split())
