@@ -44,6 +44,8 @@ MIN_EXCITED = {
     "surface_velocity": 1e-12,
 }
 """Amplitudes below which nothing is excited, in the units of the quantities."""
+SOUND = "surface_velocity"
+"""Quantity whose square is the sound power."""
 UNIT_KEYS = {
     "error": "m",
     "force": "N",
@@ -56,7 +58,7 @@ DECIDING = {
     "transmission_error": ("error",),
     "bearing_force": ("force",),
     "acceleration": ("mount_acceleration", "acceleration"),
-    "sound_power": ("surface_velocity",),
+    "sound_power": (SOUND,),
 }
 """Quantities by their name in a gearbox file; the first that is available decides."""
 USUAL = ("mount_acceleration", "force", "error")
@@ -230,7 +232,12 @@ def ranking_of(data: xr.Dataset, speeds: tuple[float, float] | None = None, want
     quantities = response_quantities(data)
     first, reason = deciding_quantity([quantity.name for quantity in quantities], wanted)
     sizes = {quantity.name: quantity.sizes(amplitude) for quantity in quantities}
-    peaks = {quantity.name: _peaks(quantity, sizes[quantity.name].max(axis=2), inside) for quantity in quantities}
+    peaks = {}
+    for quantity in quantities:
+        counted = np.repeat(inside[:, None], amplitude.shape[1], axis=1)
+        if quantity.name == SOUND:  # above the band of the housing no peak counts
+            counted &= np.isfinite(data["sound_power"].to_numpy()[:, 1:])
+        peaks[quantity.name] = _peaks(quantity, sizes[quantity.name].max(axis=2), counted)
     places = [
         (quantity.name != first, place, number, quantity.name, point, line)
         for number, quantity in enumerate(quantities)
@@ -397,9 +404,11 @@ def ranking_of_errors(
     return Ranking(found, (low, high), whole, SHAFTS)
 
 
-def _peaks(quantity: Quantity, values: Floats, inside: Booleans) -> list[tuple[int, int]]:
-    """Return point and order indices of the peaks of a quantity (points, orders), the highest first."""
-    found = [(int(point), line) for line, own in enumerate(values.T) for point in standing_peaks(own) if inside[point]]
+def _peaks(quantity: Quantity, values: Floats, counted: Booleans) -> list[tuple[int, int]]:
+    """Return point and order indices of the peaks of a quantity (points, orders) that count, the highest first."""
+    found = [
+        (int(point), line) for line, own in enumerate(values.T) for point in standing_peaks(own) if counted[point, line]
+    ]
     largest = max((values[peak] for peak in found), default=0.0)
     least = max(MIN_RELATIVE_PEAK * largest, MIN_EXCITED[quantity.name])
     return sorted((peak for peak in found if values[peak] > least), key=lambda peak: -values[peak])
