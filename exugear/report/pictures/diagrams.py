@@ -90,7 +90,9 @@ SHOWN_RANGE = 1e-4
 
 
 def plot_response(
-    data: xr.Dataset, quantity: Literal["error", "force", "acceleration"] = "error", ax: Axes | None = None
+    data: xr.Dataset,
+    quantity: Literal["error", "force", "acceleration", "mount_acceleration", "surface_velocity"] = "error",
+    ax: Axes | None = None,
 ) -> Axes:
     """Draw the amplitudes of a steady-state response over speed: the highest of all orders, and those with resonances.
 
