@@ -562,8 +562,8 @@ class Project(ReprMixin):
         ----------
         progress : called with the number of finished changes, their total, and the description of the next one
         resonance : rank of the resonance
-        quantity : ``transmission_error``, ``bearing_force`` or ``acceleration``, which decides; by default as
-            `exugear steady` ranks
+        quantity : ``transmission_error``, ``bearing_force``, ``acceleration`` or ``sound_power``, which decides; by
+            default as `exugear steady` ranks
         loads : names of load cases, or percentages of the static load such as ``50%``; by default the static load
         """
         from exugear.report.design_study import study_design_changes  # not needed by a run

@@ -65,8 +65,12 @@ def test_a_gearbox_of_ones_own_goes_from_file_to_report(tmp_path: Path, monkeypa
     lines = [line.split()[1:] for line in COMMANDS if line.startswith(".venv/bin/exugear")]
     assert [words[0] for words in lines] == ["new", "steady", "report"]
     for words in lines:
-        outcome = CliRunner().invoke(app, words)
+        more = ["--all"] if words[0] == "report" else []
+        outcome = CliRunner().invoke(app, [*words, *more], env={"COLUMNS": "80"})
         assert outcome.exit_code == 0, outcome.output
+        if words[0] == "steady":
+            (shown,) = re.findall(r"```text\n(.*?)```", TEXT, re.DOTALL)
+            assert shown in outcome.output
     results = tmp_path / "results" / "my"
     # The three commands give all that the page shows: modes and a steady-state response are computed by the last one.
     assert "Not computed" not in outcome.output

@@ -97,11 +97,11 @@ ScriptsOption = Annotated[
     ),
 ]
 QuantityOption = Annotated[
-    Literal["transmission_error", "bearing_force", "acceleration"] | None,
+    Literal["transmission_error", "bearing_force", "acceleration", "sound_power"] | None,
     typer.Option(
         "--quantity",
         metavar="NAME",
-        help="Rank by transmission_error, bearing_force, acceleration. (default: file)",
+        help="Rank by transmission_error, bearing_force, acceleration, sound_power. (default: file)",
         show_default=False,
     ),
 ]

@@ -59,8 +59,10 @@ def resonance_table(gearbox: Gearbox, ranking: Ranking, model: str) -> Table:
     if "force" in names:
         owner = {"shafts": "shaft", "housing": "housing"}.get(ranking.accelerates, ranking.accelerates)
         legend += f"; force: dynamic bearing force; accel.: {owner} at the bearing"
+    if "surface_velocity" in names[:3]:
+        legend += "; surface: normal velocity of the housing, rms over its outer surface"
     columns = [ORDER, SPEED, FREQUENCY, Column(_heading(first), partial(_amplitude_and_range, first))]
-    if first != "error":
+    if first not in ("error", "surface_velocity"):
         columns.append(Column("at", f"{first}_at", is_text=True))
     columns += [Column(_heading(name), partial(_amplitude, name)) for name in names[1:3]]
     columns += [detail(_heading(name), partial(_amplitude, name)) for name in names[3:]]

@@ -141,6 +141,8 @@ class Outcome:
     """Why the command failed, if its results are invalid or do not meet a requirement."""
     remarks: Sequence[str] = ()
     """Sentences below the tables, printed with ``--all`` only."""
+    further: Sequence[str] = ()
+    """Results below the verdict, one line each."""
 
     def show(self, as_json: bool, whole: bool) -> None:
         """Print the outcome, and end with code 1 if it is a failure."""
@@ -164,7 +166,8 @@ class Outcome:
 
     def _print(self, whole: bool) -> None:
         """Print verdict and tables; without ``--all``, say what is left out."""
-        print_text(self.verdict)
+        for line in (self.verdict, *self.further):
+            print_text(line)
         tables = [table for table in self.tables if table.rows]
         for table in tables if whole else [table.excerpt for table in tables[:1]]:
             print_table(table)

@@ -8,7 +8,7 @@ Versions of tables are in `fe_ste.tools.versions`.
 from __future__ import annotations
 
 #: Reduced flexible bodies (`exugear.system.bodies`), which runs and modes use.
-REDUCTION = 1
+REDUCTION = 2
 #: Eigenmodes (`exugear.system.modes`, and the models and matrices of `exugear.system.system`).
 MODES = 5
 #: Runs in time (`exugear.transient`, both solvers, the models, signals and filters).
@@ -16,6 +16,6 @@ RUN = 11
 #: Life of gears and bearings (`exugear.life`, and the root stress of `fe_ste.root_stress`).
 LIFE = 10
 #: Steady-state responses (`exugear.steady`, and all methods that modes use).
-STEADY = 15
+STEADY = 16
 #: Points of studies (`exugear.studies`: their outputs; the methods that these use have their own versions).
 STUDY = 4

@@ -53,7 +53,7 @@ class DampingBand:
             "band_amplitude": (
                 ("peak", "quantity", "damping_limit"),
                 self.amplitude,
-                {"long_name": words, "units": "m, N, m/s2, m/s2"},
+                {"long_name": words, "units": "m, N, m/s2, m/s2, m/s"},
             ),
         }
 

@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from exugear.results.sound.radiated_power import RadiatedPower, radiated_power
 from exugear.steady.harmonics.lines import (
     HarmonicCoupling,
     LineSet,
@@ -48,6 +49,7 @@ from exugear.steady.mean_system.mesh_places import (
 from exugear.steady.mean_system.mesh_waves import MeshWaves, mesh_waves
 from exugear.steady.mean_system.signals import (
     AXES,
+    SURFACE_VELOCITY,
     Quantity,
     SignalName,
     SignalRows,
@@ -199,6 +201,8 @@ class HarmonicBalanceModel:
         }
         self._row_names = rows[0].names
         self.signal_names: tuple[SignalName, ...] = (*self._row_names, *mesh_signal_names(waves))
+        if self.radiated is not None:
+            self.signal_names += (SURFACE_VELOCITY,)
 
     @property
     def shuttles(self) -> bool:
@@ -230,6 +234,13 @@ class HarmonicBalanceModel:
     def quantities(self) -> tuple[Quantity, ...]:
         """Quantities that describe the response, made of its signals."""
         return quantities_of([name.name for name in self.signal_names], mount_names(self.waves.assembly))
+
+    @cached_property
+    def radiated(self) -> RadiatedPower | None:
+        """Sound power by the motion in the rotating frame; None without an elastic housing."""
+        frame = self.system.frame
+        found = radiated_power(frame.assembly)
+        return None if found is None else found.in_frame(frame.matrices(0.0)[0])
 
     @cached_property
     def weights(self) -> Floats:

@@ -217,7 +217,12 @@ def signals(model: HarmonicBalanceModel, response: Response) -> Complexes:
     if levers.any():
         deflection = deflection + response.motion @ levers[:, :-1].T
         deflection[0] += levers[:, -1]
-    return np.concatenate([of_motion, deflection, response.force], axis=1)
+    found = [of_motion, deflection, response.force]
+    if model.radiated is not None:
+        # A line of a coefficient c oscillates with the amplitude 2 c.
+        velocity = model.radiated.surface_velocity(2.0 * response.motion, interface.frequencies)
+        found.append((0.5 * velocity[:, None]).astype(np.complex128))
+    return np.concatenate(found, axis=1)
 
 
 def dissipated_and_given(model: HarmonicBalanceModel, response: Response) -> tuple[float, float]:

@@ -16,8 +16,15 @@ from exugear.gearbox.load_cases import operating_range
 from exugear.gearbox.units import RPM
 from exugear.gearbox.versions import STEADY
 from exugear.results.folder import modes_path
+from exugear.results.sound.over_speed import sound_variables, surface_words
 from exugear.steady.campbell import LAYOUT
-from exugear.steady.mean_system.signals import Quantity, carried_seats, mount_names, quantities_of
+from exugear.steady.mean_system.signals import (
+    SURFACE_VELOCITY,
+    Quantity,
+    carried_seats,
+    mount_names,
+    quantities_of,
+)
 from exugear.steady.peaks import line_name
 from exugear.steady.settings import SpeedRange, SteadySettings, usual_speeds
 from exugear.steady.steady_response import SolvedPoints, SteadyResponse, response_of
@@ -130,6 +137,11 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
     coordinates["quantity"] = np.array(response.band.quantities, dtype=object)
     if response.bearing_names:
         coordinates["bearing"] = np.array(response.bearing_names, dtype=object)
+    if response.radiated is not None:
+        velocity = np.abs(amplitude[..., response.signals.index(SURFACE_VELOCITY)]).astype(np.float64)
+        more, labels = sound_variables(response.radiated, velocity, solved.speed, response.lines.orders)
+        variables |= more
+        coordinates |= labels
     return xr.Dataset(variables, coordinates, _attributes(response))
 
 
@@ -165,6 +177,7 @@ def _attributes(response: SteadyResponse) -> dict[str, Any]:
         "branch_ended": response.branch_ended,
         "not_converged": json.dumps([{"speed": speed, "reason": reason} for speed, reason in response.unsolved]),
         "crossings": json.dumps([asdict(crossing) for crossing in response.crossings]),
+        **({} if response.radiated is None else {"radiating_surface": surface_words(response.radiated)}),
     }
 
 

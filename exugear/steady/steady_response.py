@@ -12,6 +12,7 @@ import numpy as np
 
 from exugear.gearbox.load_cases import operating_range
 from exugear.gearbox.units import RPM
+from exugear.results.sound.radiated_power import RadiatedPower
 from exugear.steady.campbell import Campbell, ModeTracks, campbell_of, modes_over_speed
 from exugear.steady.crossings import (
     HARMONICS,
@@ -193,6 +194,8 @@ class SteadyResponse(ReprMixin):
     signals: tuple[SignalName, ...]
     bearing_names: tuple[str, ...]
     """Bearings whose law was evaluated in time; all others are linear about the static state."""
+    radiated: RadiatedPower | None
+    """Surface that radiates sound; None without a flexible housing."""
     solved: SolvedPoints
     """Points in ascending order of speed, or along a branch."""
     unsolved: tuple[tuple[float, str], ...]
@@ -332,6 +335,7 @@ def response_of(
         wave_names=tuple(wave.name for wave in model.waves.waves),
         signals=model.signal_names,
         bearing_names=solver.model.bearing_names,
+        radiated=model.radiated,
         solved=solved,
         unsolved=tuple(zip(points.speed[~is_solved].tolist(), points.remark[~is_solved].tolist(), strict=True)),
         crossings=found,

@@ -14,6 +14,7 @@ import xarray as xr
 from exugear.cli.case import assembled_by_iso, check_friction, steady_lack
 from exugear.cli.console import BadInputError, FailedError, not_converged_failure
 from exugear.cli.resonances import highest_resonance, resonance_table
+from exugear.cli.sound_tables import sound_line, sound_tables
 from exugear.cli.tables import Outcome, significant
 from exugear.cli.watched import WatchedProject
 from exugear.gearbox.gearbox import Gearbox
@@ -22,6 +23,7 @@ from exugear.gearbox.units import RPM
 from exugear.project import Project
 from exugear.report.findings.ranking import Ranking, ranking_of
 from exugear.results.findings import Finding
+from exugear.results.sound.over_speed import sound_over_speed
 from exugear.steady.findings import LEAST_AMPLITUDE, is_excited, response_findings, shuttling_findings
 from exugear.steady.peaks import bearing_swings, peaks, pulls
 from exugear.steady.settings import (
@@ -33,6 +35,7 @@ from exugear.steady.settings import (
     check_speeds,
     usual_speeds,
 )
+from exugear.system.bearings.stiffness import elastic_names
 from exugear.system.modal_damping import damping_in_words
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from exugear.system.tooth_mesh.tables import Shuttling, shuttling_pairs
@@ -65,6 +68,19 @@ def settings_of_options(
     return SteadySettings(speeds, method, harmonics, branches=branches)
 
 
+def check_radiating_body(project: Project) -> None:
+    """Refuse a ranking by sound power without a flexible housing, before anything is computed."""
+    gearbox = project.gearbox
+    fixed = {
+        body.name for body in gearbox.bodies() if body.fixed and gearbox.case.bodies[body.family].solid is not None
+    }
+    if not (project.choice.variant.is_elastic and fixed & set(elastic_names(gearbox))):
+        raise BadInputError(
+            f"--quantity sound_power: the variant {project.choice.variant} has no flexible housing; use --variant "
+            'flexible, and give a fixed body a [bodies.NAME.solid] table and flexibility = "elastic"'
+        )
+
+
 def steady(project: WatchedProject, settings: SteadySettings, quantity: str | None, as_json: bool, whole: bool) -> None:
     """Compute, store and print the response of a project."""
     gearbox = project.gearbox
@@ -72,6 +88,8 @@ def steady(project: WatchedProject, settings: SteadySettings, quantity: str | No
     with suppress(FailedError):  # such a failure does not apply to the selected mesh model
         if reason := steady_lack(assembled_by_iso(gearbox, project.choice.variant), project.choice.variant):
             raise BadInputError(reason)
+    if quantity == "sound_power":
+        check_radiating_body(project)
     check_friction(gearbox, project.choice.mesh_model)
     project.begin()
     project.prepare()
@@ -79,11 +97,16 @@ def steady(project: WatchedProject, settings: SteadySettings, quantity: str | No
     shuttling = neglected_shuttling(project)
     ranking = ranking_of(data, wanted=quantity or gearbox.case.report.quantity)
     summary = summarise(project, settings, data, shuttling, ranking)
+    sound = summary["sound"]
     near = [mesh for mesh in str(data.attrs["near_unconverged_states"]).split(", ") if mesh]
     Outcome(
         verdict=highest_resonance(ranking) if summary["excited"] else "No excitation",
+        further=[sound_line(sound)] if sound else [],
         summary=summary,
-        tables=[resonance_table(gearbox, ranking, f"{summary['variant']}, {summary['method']}")],
+        tables=[
+            resonance_table(gearbox, ranking, f"{summary['variant']}, {summary['method']}"),
+            *(sound_tables(sound) if sound else ()),
+        ],
         findings=[
             *response_findings(data),
             *ranking.findings,
@@ -151,6 +174,7 @@ def summarise(
             for peak in peaks(data)
             if peak.amplitude > LEAST_AMPLITUDE
         ],
+        "sound": _sound(data, ranking) if excited else None,
         "file": str(project.steady_path(settings)),
         "neglected_shuttling": [
             {"pair": pair.pair, "load_centroid_m": pair.amplitude, "over_transmission_error": pair.over_error}
@@ -181,6 +205,12 @@ def _left_out(data: xr.Dataset) -> dict[str, float]:
     """Neglected fraction of the compliance variation of each mesh, above the harmonics; planets by their family."""
     shares = zip(data["mesh_wave"].values, data["left_out"].values, strict=True)
     return {str(wave): float(share) for wave, share in shares if " " not in str(wave)}
+
+
+def _sound(data: xr.Dataset, ranking: Ranking) -> dict[str, Any] | None:
+    """Return the loudest speed among those that are ranked; None without an elastic housing."""
+    sound = sound_over_speed(data)
+    return None if sound is None else sound.inside(ranking.speeds).summary()
 
 
 def _known(value: float) -> float | None:

@@ -226,9 +226,10 @@ class OperationSection(Section):
 class ReportSection(Section):
     """Settings of rankings and reports: the deciding quantity, and a measured or published frequency."""
 
-    quantity: Literal["transmission_error", "bearing_force", "acceleration"] | None = None
+    quantity: Literal["transmission_error", "bearing_force", "acceleration", "sound_power"] | None = None
     """Quantity by which resonances are ranked. By default the acceleration at the mounts of a flexible housing, or else
-    the bearing force, or with ideal joints the transmission error."""
+    the bearing force, or with ideal joints the transmission error. ``sound_power`` is the surface velocity of a
+    flexible housing."""
     reference_frequency_Hz: q.FrequencyHz | None = None
     """Frequency near which modes are listed, such as a measured one."""
 

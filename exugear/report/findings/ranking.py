@@ -38,14 +38,29 @@ AROUND = (0.8, 1.15)
 """Speeds drawn first, as factors of the ends of the operating range."""
 MIN_RELATIVE_PEAK = 1e-9
 """Peaks below this fraction of the largest peak of their quantity are round-off."""
-MIN_EXCITED = {"error": 1e-12, "force": 1e-6, "acceleration": 1e-9, "mount_acceleration": 1e-9}
+MIN_EXCITED = {
+    "error": 1e-12,
+    "force": 1e-6,
+    "acceleration": 1e-9,
+    "mount_acceleration": 1e-9,
+    "surface_velocity": 1e-12,
+}
 """Amplitudes below which nothing is excited, in the units of the quantities."""
-UNIT_KEYS = {"error": "m", "force": "N", "acceleration": "m_per_s2", "mount_acceleration": "m_per_s2"}
+SOUND = "surface_velocity"
+"""Quantity whose square is the sound power."""
+UNIT_KEYS = {
+    "error": "m",
+    "force": "N",
+    "acceleration": "m_per_s2",
+    "mount_acceleration": "m_per_s2",
+    "surface_velocity": "m_per_s",
+}
 """Units in the keys of ``--json``."""
 DECIDING = {
     "transmission_error": ("error",),
     "bearing_force": ("force",),
     "acceleration": ("mount_acceleration", "acceleration"),
+    "sound_power": (SOUND,),
 }
 """Quantities by their name in a gearbox file; the first that is available decides."""
 USUAL = ("mount_acceleration", "force", "error")
@@ -109,8 +124,8 @@ class Resonance:
     frequency: float
     """Hz."""
     amplitudes: Mapping[str, PeakAmplitude]
-    """By quantity: ``error`` (m); with bearings ``force`` (N) and ``acceleration`` (m/s2); with mounts of a flexible
-    housing ``mount_acceleration`` (m/s2)."""
+    """By quantity: ``error`` (m); with bearings ``force`` (N) and ``acceleration`` (m/s2); with a flexible housing
+    ``surface_velocity`` (m/s), whose square is the sound power, and with its mounts ``mount_acceleration`` (m/s2)."""
 
     @property
     def best(self) -> int:
@@ -226,7 +241,12 @@ def ranking_of(data: xr.Dataset, speeds: tuple[float, float] | None = None, want
     quantities = response_quantities(data)
     first, reason = deciding_quantity([quantity.name for quantity in quantities], wanted)
     sizes = {quantity.name: quantity.sizes(amplitude) for quantity in quantities}
-    peaks = {quantity.name: _peaks(quantity, sizes[quantity.name].max(axis=2), inside) for quantity in quantities}
+    peaks = {}
+    for quantity in quantities:
+        counted = np.repeat(inside[:, None], amplitude.shape[1], axis=1)
+        if quantity.name == SOUND:  # above the band of the housing no peak counts
+            counted &= np.isfinite(data["sound_power"].to_numpy()[:, 1:])
+        peaks[quantity.name] = _peaks(quantity, sizes[quantity.name].max(axis=2), counted)
     places = [
         (quantity.name != first, place, number, quantity.name, point, line)
         for number, quantity in enumerate(quantities)
@@ -253,8 +273,8 @@ def resonances(data: xr.Dataset, quantity: str | None = None) -> pd.DataFrame:
     Parameters
     ----------
     data : result of `exugear.project.Project.steady` or `exugear.steady.steady_file.steady_response`
-    quantity : ``transmission_error``, ``bearing_force`` or ``acceleration``, by which they are sorted; by default the
-        acceleration at the mounts of a flexible housing, or else the bearing force
+    quantity : ``transmission_error``, ``bearing_force``, ``acceleration`` or ``sound_power``, by which they are sorted;
+        by default the acceleration at the mounts of a flexible housing, or else the bearing force
 
     Returns
     -------
@@ -393,9 +413,11 @@ def ranking_of_errors(
     return Ranking(found, (low, high), whole, SHAFTS)
 
 
-def _peaks(quantity: Quantity, values: Floats, inside: Booleans) -> list[tuple[int, int]]:
-    """Return point and order indices of the peaks of a quantity (points, orders), the highest first."""
-    found = [(int(point), line) for line, own in enumerate(values.T) for point in standing_peaks(own) if inside[point]]
+def _peaks(quantity: Quantity, values: Floats, counted: Booleans) -> list[tuple[int, int]]:
+    """Return point and order indices of the peaks of a quantity (points, orders) that count, the highest first."""
+    found = [
+        (int(point), line) for line, own in enumerate(values.T) for point in standing_peaks(own) if counted[point, line]
+    ]
     largest = max((values[peak] for peak in found), default=0.0)
     least = max(MIN_RELATIVE_PEAK * largest, MIN_EXCITED[quantity.name])
     return sorted((peak for peak in found if values[peak] > least), key=lambda peak: -values[peak])

@@ -54,6 +54,7 @@ QUANTITIES = {
     "force": QuantityLabel("Bearing force", "bearing force", "force", "kN", 1e-3),
     "acceleration": QuantityLabel("Acceleration at bearings", "acceleration at bearings", "accel.", "m/s²", 1.0),
     "mount_acceleration": QuantityLabel("Acceleration at mounts", "acceleration at mounts", "mounts", "m/s²", 1.0),
+    "surface_velocity": QuantityLabel("Surface velocity", "surface velocity", "surface", "mm/s", 1e3),
 }
 """Labels of the quantities of a ranking."""
 

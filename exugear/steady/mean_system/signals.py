@@ -1,4 +1,4 @@
-"""Signals of a steady-state response: transmission errors, forces of meshes and bearings, accelerations of seats.
+"""Signals of a steady-state response: transmission errors, forces, accelerations, surface velocity of the housing.
 
 Bearings of planets have multi-blade components, along radius and tangent, as the planets themselves.
 
@@ -35,6 +35,10 @@ class SignalName:
     """``quantity``, or ``quantity of what, which part``."""
     quantity: str
     units: str
+
+
+SURFACE_VELOCITY = SignalName("surface_velocity", "surface_velocity", "m/s")
+"""Normal velocity of the outer surface of a flexible housing, root mean square over the surface, without a phase."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,6 +239,7 @@ SIGNALS = {
     "force": ("support_force", "N"),
     "acceleration": ("seat_acceleration", "m/s2"),
     "mount_acceleration": ("seat_acceleration", "m/s2"),
+    "surface_velocity": ("surface_velocity", "m/s"),
 }
 """Signals of each quantity and their units."""
 
@@ -260,7 +265,9 @@ def quantities_of(names: Sequence[str], mounts: Collection[str]) -> tuple[Quanti
         for at, name in enumerate(names):
             kind, _, rest = name.partition(" ")
             place, *wave = rest.split(" ")[:-1] or [""]
-            if kind == signal and (quantity == "error" or (place in mounts) == quantity.startswith("mount")):
+            if kind == signal and (
+                quantity in ("error", "surface_velocity") or (place in mounts) == quantity.startswith("mount")
+            ):
                 places.setdefault(place, {}).setdefault(" ".join(wave), []).append(at)
         if places:
             signals = tuple(np.array([*waves.values()]) for waves in places.values())

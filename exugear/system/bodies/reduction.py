@@ -96,6 +96,20 @@ class BodySurface:
 
 
 @dataclass(frozen=True)
+class RadiatingSurface:
+    """Outer surface of a reduced body, for the sound that it radiates; n coordinates."""
+
+    matrix: Floats
+    """(n, n) integral of (n . u)(n . u)^T over the surface, with the normal displacement n . u per coordinate, m2."""
+    area: float
+    """Of the outer surface, with the discs that close its openings, m2."""
+    whole_area: float
+    """Of the whole surface of the solid, inside and outside, m2."""
+    band: float
+    """Cut-off frequency of the reduction, Hz."""
+
+
+@dataclass(frozen=True)
 class ReductionSummary:
     """What a reduction took and which modes it kept, by harmonic, or under "whole" for a solid mesh."""
 
@@ -139,6 +153,8 @@ class ReducedBody(
     """For pictures."""
     summary: ReductionSummary
     """What the reduction took and which modes it kept."""
+    radiating: RadiatingSurface | None = None
+    """Outer surface of a solid on the ground; None for other bodies."""
 
     @property
     def size(self) -> int:
@@ -209,8 +225,12 @@ class RigidInertia:
     axial: float
 
 
-MOST_LANCZOS_STEPS = 150
-"""Lanczos steps after which the search for normal modes is given up."""
+MOST_LANCZOS_STEPS = 1000
+"""Lanczos steps after which the search for normal modes is given up: some three steps find one mode."""
+ROWS_AT_A_TIME = 100
+"""Lanczos vectors for which memory is reserved at once."""
+CHECKED_EACH, CHECK_EVERY = 100, 10
+"""Steps up to which convergence is checked after each; after so many each beyond."""
 LANCZOS_TOLERANCE = 1e-9
 """Relative residual of a normal mode; its frequency is then exact to the square of it."""
 INDEPENDENCE_TOLERANCE = 1e-8
@@ -358,29 +378,32 @@ def _lanczos_sweep(
     mass: SparseMatrix, shifted: Factorisation, known: Floats, start: Floats, shift: float, band: float
 ) -> tuple[Floats, Floats]:
     """Frequencies (Hz) up to the first beyond the band, and shapes, of what is orthogonal to the known ones."""
-    basis = [*known.T]
-    images = [*(mass @ known).T]
-    count = len(basis)
+    count = known.shape[1]
+    basis = np.concatenate([known.T, np.empty((ROWS_AT_A_TIME, len(start)))])
     diagonal: list[float] = []
     beside: list[float] = []
     vector = start
     while len(diagonal) < MOST_LANCZOS_STEPS:
-        before = np.array(basis)
-        image = np.array(images)
+        size = count + len(diagonal)
+        before = basis[:size]
         for _ in range(2):  # once leaves round-off of the first pass
-            vector = vector - before.T @ (image @ vector)
-        vector_image = mass @ vector
-        length = float(np.sqrt(vector @ vector_image))
+            vector = vector - (before @ (mass @ vector)) @ before
+        image = mass @ vector
+        length = float(np.sqrt(vector @ image))
         if diagonal:
             beside.append(length)
-            converged = _converged(diagonal, beside, shift, band)
-            if converged is not None:
-                frequencies, weights = converged
-                return frequencies, np.array(basis[count:]).T @ weights
-        basis.append(vector / length)
-        images.append(vector_image / length)
-        vector = shifted.solve(images[-1])
-        diagonal.append(float(images[-1] @ vector))
+            # The eigenvalues of many steps cost more than a few more steps.
+            if len(diagonal) < CHECKED_EACH or len(diagonal) % CHECK_EVERY == 0:
+                converged = _converged(diagonal, beside, shift, band)
+                if converged is not None:
+                    frequencies, weights = converged
+                    return frequencies, before[count:].T @ weights
+        if size == len(basis):
+            basis = np.concatenate([basis, np.empty((ROWS_AT_A_TIME, len(start)))])
+        basis[size] = vector / length
+        image /= length
+        vector = shifted.solve(image)
+        diagonal.append(float(image @ vector))
     raise ReductionError(
         f"more normal modes below {band:g} Hz than {MOST_LANCZOS_STEPS} steps find; set a lower band_Hz"
     )
@@ -498,6 +521,7 @@ def load_or_reduce(path: Path, key: str, reduce: Callable[[], ReducedBody]) -> R
 
 _MATRICES = ("mass", "stiffness", "gyroscopic", "spin")
 _SURFACE = ("points", "quads", "displacement", "strain", "elasticity")
+_RADIATING = ("matrix", "area", "whole_area", "band")
 _SUMMARY = {
     "unknowns": "unknowns",
     "seconds": "seconds",
@@ -517,6 +541,8 @@ def _arrays_of(body: ReducedBody) -> dict[str, NDArray[Any]]:
     }
     arrays = {name: getattr(body, name) for name in _MATRICES}
     arrays |= {name: getattr(body.surface, name) for name in _SURFACE}
+    if body.radiating is not None:
+        arrays |= {f"radiating_{name}": np.array(getattr(body.radiating, name)) for name in _RADIATING}
     return {"words": np.array(json.dumps(words)), **arrays}
 
 
@@ -533,4 +559,12 @@ def _from_arrays(arrays: Mapping[str, NDArray[Any]]) -> ReducedBody:
         modal_groups=tuple(words["groups"]),
         surface=BodySurface(**{name: arrays[name] for name in _SURFACE}),
         summary=ReductionSummary(**summary),
+        radiating=_radiating_from(arrays),
     )
+
+
+def _radiating_from(arrays: Mapping[str, NDArray[Any]]) -> RadiatingSurface | None:
+    if "radiating_matrix" not in arrays:
+        return None
+    matrix, *sizes = (arrays[f"radiating_{name}"] for name in _RADIATING)
+    return RadiatingSurface(matrix, *(float(size) for size in sizes))

@@ -322,7 +322,7 @@ def _facets(mesh: Any, seat: SolidSeat) -> Integers:
 
 def _rows(mesh: Any, facets: Integers, centre: Floats) -> Floats:
     """Averages over facets, (6, 3 n): displacement of the centre and turns."""
-    nodes = _facet_nodes(mesh, facets)
+    nodes = facet_nodes(mesh, facets)
     element = skfem.ElementTriP2() if nodes.shape[1] == 6 else skfem.ElementQuad2()
     points, weights = skfem.quadrature.get_quadrature(element, 5)
     functions = [element.lbasis(points, number) for number in range(nodes.shape[1])]
@@ -348,7 +348,7 @@ def _rows(mesh: Any, facets: Integers, centre: Floats) -> Floats:
     return rows
 
 
-def _facet_nodes(mesh: Any, facets: Integers) -> Integers:
+def facet_nodes(mesh: Any, facets: Integers) -> Integers:
     """Nodes of facets, (f, 6) or (f, 9): corners around each, middles of its edges, its own middle if it has one."""
     corners = ordered_corners(mesh, facets)[:, : 3 if mesh.t.shape[0] == 4 else 4]
     sides = [corners, np.roll(corners, -1, axis=1)]

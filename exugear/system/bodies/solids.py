@@ -40,6 +40,7 @@ from numpy.typing import NDArray
 from exugear.gearbox.versions import REDUCTION
 from exugear.system.bodies.elastic_body import FloatingBody, skew
 from exugear.system.bodies.lazy import lazy_import
+from exugear.system.bodies.outer_surface import radiating_surface
 from exugear.system.bodies.reduction import (
     ELASTIC,
     Blank,
@@ -211,6 +212,11 @@ def reduced_body(model: SolidModel, reduced: ReducedSolid) -> ReducedBody:
             seconds=reduced.seconds + time.perf_counter() - began,
             free_interface_frequencies={"whole": component.frequencies},
             mass_scaled_frequencies={"whole": mass_scaled},
+        ),
+        radiating=(
+            radiating_surface(reduced.solid.mesh, model.seats, component.component_modes, model.band)
+            if model.frame == "ground"
+            else None
         ),
     )
 

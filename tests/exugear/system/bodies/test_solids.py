@@ -19,7 +19,7 @@ import scipy.sparse.linalg
 import skfem
 
 from exugear.system.bodies import solid_elements, solid_files
-from exugear.system.bodies.reduction import Blank, ReducedBody, ReductionError
+from exugear.system.bodies.reduction import Blank, ReducedBody, ReductionError, free_interface_modes
 from exugear.system.bodies.shaft_sections import MeshSize, SeatBand, ShaftSection
 from exugear.system.bodies.solid_elements import SolidError, SolidSeat, assemble, seat_rows
 from exugear.system.bodies.solid_files import read_solid, tetrahedra
@@ -461,3 +461,22 @@ def test_a_damaged_mesh_of_gmsh_is_refused_and_never_run_as_a_script(tmp_path: P
     with pytest.raises(SolidError, match="meshio cannot read it as gmsh"):
         read_solid(script)
     assert not told.exists()
+
+
+def test_more_modes_than_a_hundred_and_fifty_steps_find_are_those_of_a_dense_solver(monkeypatch):
+    mesh = skfem.MeshHex2.from_mesh(
+        skfem.MeshHex.init_tensor(np.linspace(0.0, 0.5, 5), np.linspace(0.0, 0.4, 4), np.linspace(0.0, 0.3, 4))
+    )
+    solid = assemble(mesh, STEEL)
+    rigid = solid.rigid_motions((0.0, 0.0, 0.0))
+    values = scipy.linalg.eigh(solid.stiffness.toarray(), solid.mass.toarray(), eigvals_only=True)
+    expected = np.sqrt(values[6:]) / (2.0 * np.pi)
+    band = float(expected[119:121].mean())
+    shift = (np.pi * band) ** 2
+    shapes, found = free_interface_modes(solid.mass, solid.stiffness, rigid, shift, band)
+    assert shapes.shape[1] == len(found) - 1 == 120
+    assert found == pytest.approx(expected[:121], rel=1e-9)
+    assert shapes.T @ (solid.mass @ shapes) == pytest.approx(np.eye(120), abs=1e-6)
+    monkeypatch.setattr("exugear.system.bodies.reduction.MOST_LANCZOS_STEPS", 150)
+    with pytest.raises(ReductionError, match="more normal modes below"):
+        free_interface_modes(solid.mass, solid.stiffness, rigid, shift, band)

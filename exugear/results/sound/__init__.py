@@ -1,0 +1,1 @@
+"""Sound power of the housing, from its vibration."""

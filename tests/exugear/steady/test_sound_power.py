@@ -1,0 +1,192 @@
+"""Sound power of a gearbox with a flexible housing, over speed and order."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from exugear.cli.sound_tables import sound_line, sound_tables
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.report.findings.ranking import ranking_of
+from exugear.results.sound.levels import a_weighting, power_level
+from exugear.results.sound.over_speed import sound_over_speed
+from exugear.results.sound.radiated_power import AIR_IMPEDANCE, radiated_power
+from exugear.steady.findings import UPPER_ESTIMATE, response_findings
+from exugear.steady.point_solver import PointSolver, harmonic_balance_model
+from exugear.steady.response import signals
+from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.steady.steady_file import load_response, stored_or_computed
+from exugear.system.loads import LoadTable
+from exugear.transient.compiled.solver import CompiledSystem
+
+from ...optional_libraries import needs_meshio
+from ..cases.assembled import assembled
+from ..cases.box import box_content
+from ..cases.command import exugear
+from ..cases.spur import SPUR_CASE
+
+pytestmark = needs_meshio
+
+STIFFNESS = {"spur": 3e8 * (1.0 + 0.08 * np.cos(2.0 * np.pi * np.arange(50) / 50))}
+LIMIT = 8000.0 / 1.5
+
+
+@pytest.fixture(scope="module")
+def housed(tmp_path_factory: pytest.TempPathFactory):
+    """Spur pair in an elastic plate, 125 x 50 x 12 mm."""
+    folder = tmp_path_factory.mktemp("box")
+    box = Gearbox.from_dict(box_content(folder), str(folder / "case.toml"))
+    return assembled(box, Choice("flexible", "line_of_action"), STIFFNESS)
+
+
+@pytest.fixture(scope="module")
+def data(housed, tmp_path_factory: pytest.TempPathFactory):
+    settings = SteadySettings(SpeedRange.from_text("600:3000:9"), harmonics=10, at_resonances=False)
+    file = tmp_path_factory.mktemp("steady") / "steady-parametric.nc"
+    stored_or_computed(file, housed, settings)
+    return load_response(file)
+
+
+def test_the_plate_radiates_from_all_of_its_surface(housed):
+    found = radiated_power(housed)
+    assert found is not None
+    assert found.bodies == ("box",)
+    assert found.area == pytest.approx(2 * (0.125 * 0.05 + 0.175 * 0.012), rel=1e-9)
+    assert found.limit == pytest.approx(LIMIT)
+
+
+def test_orders_and_third_octaves_add_up_to_the_total(data):
+    power = data["sound_power"].to_numpy()
+    frequency = np.outer(data["speed"], data["order"]) / (2.0 * np.pi)
+    total = data["sound_level"].sel(weighting="Z").to_numpy()
+    weighted = data["sound_level"].sel(weighting="A").to_numpy()
+    assert total == pytest.approx(power_level(np.nansum(power, axis=1)), abs=1e-9)
+    heard = np.nansum(power[:, 1:] * 10 ** (0.1 * a_weighting(frequency[:, 1:])), axis=1)
+    assert weighted == pytest.approx(power_level(heard), abs=1e-9)
+    bands = 10 ** (0.1 * data["third_octave_level"].to_numpy()) * 1e-12
+    assert power_level(bands.sum(axis=1)) == pytest.approx(np.stack([total, weighted], axis=1), abs=1e-6)
+
+
+def test_orders_above_two_thirds_of_the_band_are_left_out_by_name(data):
+    frequency = np.outer(data["speed"], data["order"]) / (2.0 * np.pi)
+    assert np.array_equal(np.isnan(data["sound_power"].to_numpy()), frequency > LIMIT)
+    sound = sound_over_speed(data)
+    assert sound is not None
+    assert [name for name, _ in sound.orders_left_out()] == [f"{n} x spur" for n in range(6, 11)]
+    texts = [finding.text for finding in response_findings(data) if finding.level == "warning"]
+    assert UPPER_ESTIMATE in texts
+    assert any("6 x spur at 6000 Hz" in text and "bodies.box.solid.band_Hz" in text for text in texts)
+
+
+def test_power_is_that_of_the_surface_velocity(data):
+    velocity = data["amplitude"].sel(signal="surface_velocity").to_numpy().astype(float)
+    power = data["sound_power"].to_numpy()
+    known = np.isfinite(power)
+    area = json.loads(data.attrs["radiating_surface"])["outer_surface_m2"]
+    assert power[known] == pytest.approx(0.5 * AIR_IMPEDANCE * area * velocity[known] ** 2, rel=1e-6)
+
+
+def test_sound_power_ranks_resonances_if_it_is_asked_to(data):
+    ranking = ranking_of(data, wanted="sound_power")
+    assert (ranking.quantity, ranking.wanted) == ("surface_velocity", "sound_power")
+    heights = [
+        own.amplitudes["surface_velocity"].amplitude
+        for own in ranking.resonances
+        if own.amplitudes["surface_velocity"].place
+    ]
+    assert heights == sorted(heights, reverse=True)
+    assert ranking_of(data).quantity == "mount_acceleration"
+
+
+def test_the_loudest_speed_is_said_with_its_loudest_order(data):
+    sound = sound_over_speed(data)
+    assert sound is not None
+    summary = sound.summary()
+    levels = data["sound_level"].sel(weighting="A").to_numpy()
+    assert summary["level_dBA"] == pytest.approx(levels.max(), abs=1e-9)
+    assert summary["speed_rpm"] == pytest.approx(float(data["speed_rpm"][int(levels.argmax())]))
+    first = summary["orders"][0]
+    line = sound_line(summary)
+    assert f"{summary['level_dBA']:.1f} dB(A), upper estimate" in line
+    assert first["line"].replace(" x ", " × ") in line
+    orders, bands = sound_tables(summary)
+    assert len(orders.rows) == 5
+    assert sum(10 ** (0.1 * row["level_dB"]) for row in bands.rows) == pytest.approx(10 ** (0.1 * summary["level_dB"]))
+    assert json.dumps(summary)
+
+
+def test_a_rigid_housing_has_no_sound_power(housed):
+    rigid = assembled(housed.gearbox, Choice("bushing", "line_of_action"), STIFFNESS)
+    assert radiated_power(rigid) is None
+
+
+@pytest.mark.validation
+def test_power_of_surface_velocities_in_a_run_is_that_of_the_steady_orders(housed):
+    # The run starts on the steady state. Its surface velocities are integrated over the drawn faces, bilinear between
+    # their corners, and averaged over whole mesh periods.
+    speed = 1500.0 * math.pi / 30.0
+    solver = PointSolver(harmonic_balance_model(housed, np.array([speed]), 10), "parametric")
+    model, response = solver.model, solver.response(speed)
+    steady = 2.0 * signals(model, response)[1:, -1].real
+    area = model.radiated.area
+    expected = 0.5 * AIR_IMPEDANCE * area * float(np.sum(steady**2))
+
+    system, motion = model.system, response.motion
+    w = response.interface.frequencies[1:, None]
+    u = system.static_at(speed) + motion[0].real + 2.0 * motion[1:].sum(axis=0).real
+    q, v, _ = system.frame.state(0.0, speed, u, 2.0 * (1j * w * motion[1:]).sum(axis=0).real)
+    load = housed.gearbox.case.static_load
+    period = 2.0 * math.pi / (speed * float(model.lines.orders[1]))
+    steps = 400
+    run = CompiledSystem(
+        model.waves.assembly,
+        q,
+        v,
+        LoadTable({**load.torques_N_m, load.locked[0]: response.torque}),
+        period / steps,
+    )
+    surface = housed.elastic_bodies["box"].reduced.surface
+    corners, moved = surface.points[surface.quads], surface.displacement[surface.quads]
+    points = np.array([-1.0, 1.0]) / math.sqrt(3.0)
+    powers = []
+    for number in range(20):
+        states = np.empty((steps, housed.size))
+        rates = np.empty_like(states)
+        assert run.advance(number * steps, states, rates) == steps
+        own = rates[:, housed.elastic_slices["box"]]
+        total = np.zeros(steps)
+        for a in points:
+            for b in points:
+                shape = 0.25 * np.array([(1 - a) * (1 - b), (1 + a) * (1 - b), (1 + a) * (1 + b), (1 - a) * (1 + b)])
+                by_a = 0.25 * np.array([-(1 - b), 1 - b, 1 + b, -(1 + b)])
+                by_b = 0.25 * np.array([-(1 - a), -(1 + a), 1 + a, 1 - a])
+                normal = np.cross(np.einsum("k,fkd->fd", by_a, corners), np.einsum("k,fkd->fd", by_b, corners))
+                size = np.linalg.norm(normal, axis=1)
+                rows = np.einsum("k,fd,fkdn->fn", shape, normal / size[:, None], moved)
+                total += np.square(own @ rows.T) @ size
+        powers.append(AIR_IMPEDANCE * total.mean())
+    assert 10.0 * math.log10(np.mean(powers) / expected) == pytest.approx(0.0, abs=0.3)
+
+
+def test_a_ranking_by_sound_power_without_a_flexible_housing_is_refused(tmp_path):
+    file = tmp_path / "spur.toml"
+    file.write_text(SPUR_CASE, encoding="utf-8")
+    outcome = exugear("steady", file, "--mesh-model", "line_of_action", "--quantity", "sound_power")
+    assert outcome.exit_code == 2
+    assert "--quantity sound_power: the variant bushing has no flexible housing" in " ".join(outcome.stderr.split())
+
+
+def test_no_resonance_in_sound_power_lies_at_or_above_the_limit_of_the_band(data):
+    # An order that rises up to the limit has no peak there: the curve itself goes on.
+    limited = data.copy()
+    frequency = np.outer(np.abs(data["speed"]), data["order"]) / (2.0 * np.pi)
+    limited["sound_power"] = data["sound_power"].where(xr.DataArray(frequency < 2500.0, dims=("point", "line")))
+    found = [own for own in ranking_of(limited).resonances if own.amplitudes["surface_velocity"].place]
+    everything = [own for own in ranking_of(data).resonances if own.amplitudes["surface_velocity"].place]
+    assert [own.frequency for own in found] == [own.frequency for own in everything if own.frequency < 2500.0]
+    assert len(found) < len(everything)
