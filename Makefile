@@ -148,6 +148,7 @@ benchmarks: $(INSTALLED)
 
 check: $(INSTALLED)
 	$(RUN)/ruff check .
+	$(RUN)/ruff format --check .
 	$(RUN)/mypy
 
 # Node comes as a wheel and stays out of $(VENV): nothing but these two targets needs it.

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from fe_ste.geometry.profile import ToothProfile, tooth_profile
     from fe_ste.reference.position import NonlinearSettings, nonlinear_position
     from fe_ste.standards import iso6336
+    from fe_ste.tools.drawing import paper_axes
     from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
     from fe_ste.transmission_error.grid import Checkpoint, GridError
     from fe_ste.transmission_error.surface import SteSurface
@@ -59,6 +60,7 @@ __all__ = [
     "nonlinear_position",
     "pair_compliance",
     "static_transmission_error",
+    "paper_axes",
     "tooth_profile",
 ]
 
@@ -88,6 +90,7 @@ _HOMES = {
     "nonlinear_position": "fe_ste.reference.position",
     "pair_compliance": "fe_ste.transmission_error.compliance",
     "static_transmission_error": "fe_ste.transmission_error.transmission_error",
+    "paper_axes": "fe_ste.tools.drawing",
     "tooth_profile": "fe_ste.geometry.profile",
 }
 

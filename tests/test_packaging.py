@@ -42,8 +42,10 @@ def test_a_type_checker_elsewhere_finds_both_packages_in_the_editable_install(tm
     script = tmp_path / "use.py"
     wrong = "import exugear\nfrom fe_ste.tools.versions import TABLE\nnumber: str = TABLE\n"
     script.write_text(wrong, encoding="utf-8")
-    # All of exugear would take half a minute: that it is found is enough.
-    (tmp_path / "mypy.ini").write_text("[mypy]\n[mypy-exugear.*]\nfollow_imports = skip\n", encoding="utf-8")
+    # All of both packages would take a minute: that they are found is enough.
+    sections = [f"[mypy-{name}]\nfollow_imports = skip\n" for name in ("exugear.*", "fe_ste.*", "numpy.*")]
+    sections.append("[mypy-fe_ste.tools.versions]\nfollow_imports = normal\n")
+    (tmp_path / "mypy.ini").write_text("".join(["[mypy]\n", *sections]), encoding="utf-8")
     environment = {key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "MYPYPATH")}
     told = subprocess.run(
         [sys.executable, "-m", "mypy", "--cache-dir", str(tmp_path / "cache"), script.name],

@@ -1,6 +1,6 @@
-"""Self-contained web page with the report of a results folder: its sections, headline, controls and footer.
+"""Self-contained web page with the report of a results folder: its six parts, headline, controls and footer.
 
-`SECTIONS` has the order of the page; a section is a function from `ReportData` to its `Part`.
+`SECTIONS` has the order of the page; a part is made by a function from `ReportData` to its `Part`.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from exugear.report.findings.context import (
     StoredResults,
     bytes_of_runs,
     choice_of,
+    shown_path,
     stored_models,
     with_responses,
 )
@@ -31,20 +32,16 @@ from exugear.report.findings.headline import Headline, headline_of
 from exugear.report.findings.other_design import read_other_design
 from exugear.report.findings.parameter_variations import begin_variations, model_variations
 from exugear.report.findings.ratings import ratings_of
+from exugear.report.findings.resonance_list import resonance_list
 from exugear.report.findings.words import Labels
-from exugear.report.sections.answer import ranking_section, short_section
+from exugear.report.sections.answer import answer_section
 from exugear.report.sections.bearings import bearings_section
 from exugear.report.sections.changes import changes_section, stored_study
-from exugear.report.sections.comparison import comparison_section
-from exugear.report.sections.contact import contact_section
 from exugear.report.sections.gears import gears_section
-from exugear.report.sections.life import life_section, studies_section
 from exugear.report.sections.material import Part, ReportData, lines_of
-from exugear.report.sections.modes import change_section, modes_section, target_frequency_section
-from exugear.report.sections.results import checks_section, resonances_section, results_section, waterfall_section
+from exugear.report.sections.model import model_section
+from exugear.report.sections.resonances import resonances_section
 from exugear.report.sections.run_data import run_data
-from exugear.report.sections.steady import steady_section
-from exugear.report.sections.trust import trust_section
 from exugear.report.web.document import ArrayStore, whole_page
 from exugear.report.web.html import render
 from exugear.results.findings import Finding
@@ -76,7 +73,7 @@ def commands_for_missing(context: Context, results: StoredResults) -> list[str]:
 
 def command_line(gearbox: Gearbox, folder: Path, verb: str, model: Choice) -> str:
     """Return a command line for model settings, without options that have their default values."""
-    words = ["exugear", verb, _shown(gearbox.source), "--variant", str(model.variant)]
+    words = ["exugear", verb, shown_path(gearbox.source), "--variant", str(model.variant)]
     usual = Choice(model.variant)
     if model.mesh_model != usual.mesh_model:
         words += ["--mesh-model", model.mesh_model]
@@ -84,15 +81,7 @@ def command_line(gearbox: Gearbox, folder: Path, verb: str, model: Choice) -> st
         words += ["--inertias", str(model.inertias)]
     if verb == "steady" and LAWS[model.mesh_model].loses_contact:
         words += ["--method", "nonlinear"]
-    return shlex.join([*words, "--out", _shown(folder)])
-
-
-def _shown(path: str | Path) -> str:
-    """Return a path from the current folder, or its name: the page does not show where it is on this machine."""
-    absolute = Path(path).absolute()
-    if absolute.is_relative_to(Path.cwd()):
-        return str(absolute.relative_to(Path.cwd()))
-    return absolute.name
+    return shlex.join([*words, "--out", shown_path(folder)])
 
 
 def _scope(material: ReportData) -> str:
@@ -110,26 +99,14 @@ def _scope(material: ReportData) -> str:
 # The report of a results folder as a self-contained web page
 
 SECTIONS: Final[tuple[Callable[[ReportData], Part], ...]] = (
-    short_section,
-    checks_section,
-    ranking_section,
-    changes_section,
-    comparison_section,
-    change_section,
-    results_section,
-    waterfall_section,
+    answer_section,
     resonances_section,
+    changes_section,
     bearings_section,
-    life_section,
-    steady_section,
-    modes_section,
-    target_frequency_section,
-    contact_section,
     gears_section,
-    studies_section,
-    trust_section,
+    model_section,
 )
-"""Sections of the page in their order. A new section is a function in a module of this package and an entry here."""
+"""The six parts of the page in their order."""
 LIBRARIES: Final = ("uPlot.iife.min.js", "three.min.js")
 """Vendored libraries that the page needs."""
 WORTH_A_PROCESS: Final = 3e7
@@ -198,7 +175,6 @@ def write_report(
     if compare is not None:
         material = replace(material, other_design=read_other_design(context, material.headline, compare))
     parts = [section(material) for section in SECTIONS]
-    missing = tuple(commands_for_missing(context, material.results))
     # The body is made last, because sections add notes that its head shows.
     body = render(
         "report",
@@ -206,7 +182,6 @@ def write_report(
         scope=_scope(material),
         parts=[part for part in parts if part.html],
         notes=context.notes,
-        missing=missing,
         steady=material.headline is not None and material.headline.response is not None,
         source=material.file_words,
     )
@@ -226,7 +201,7 @@ def write_report(
         path,
         tuple(notes.statements),
         resonances,
-        missing,
+        material.missing,
         tuple(notes.left_out),
         gearbox,
         material.headline,
@@ -246,12 +221,14 @@ def _material(context: Context, executor: Executor | None) -> ReportData:
     groups = groups_of(context, results)
     words = Labels(context.gearbox)
     headline = headline_of(context, results, groups)
-    material = ReportData(context, results, words, groups, (), lines_of(context), headline, ArrayStore())
+    lists = {(group.name, variant): resonance_list(group, variant) for group in groups for variant in group.runs}
+    material = ReportData(context, results, words, groups, (), lines_of(context), headline, ArrayStore(), lists)
     # Variations come last; another process may compute them in the meantime.
     drawn = run_data(material)
     return replace(
         material,
         run_data=drawn,
+        missing=tuple(commands_for_missing(context, results)),
         ratings=ratings_of(context),
         design_study=stored_study(context),
         variations=model_variations(context, results.modes, begun),

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,9 +13,10 @@ import numpy as np
 from exugear.gearbox.units import RPM
 from exugear.results.findings import Finding, check_finding
 from exugear.results.sound.over_speed import sound_over_speed
-from exugear.steady.peaks import STRAINED, bearing_swings, pulls
+from exugear.steady.peaks import STRAINED, bearing_swings, dynamic_load_ratios, pulls, tensile_fractions
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from exugear.system.tooth_mesh.tables import Shuttling
+from fe_ste.tools.arrays import Floats
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,6 +48,39 @@ def response_findings(data: xr.Dataset) -> tuple[Finding, ...]:
     data : as `exugear.steady.steady_file.load_response` reads it
     """
     return (*_balance(data), *_speeds(data), *_models(data), *_excitation(data), *_sound(data))
+
+
+@dataclass(frozen=True)
+class SpeedCaveats:
+    """What weakens the amplitudes at single speeds of a response."""
+
+    speed: Floats
+    """(n,) absolute input speed, rad/s."""
+    load_ratios: Mapping[str, Floats]
+    """Dynamic over static load by bearing, (n,)."""
+    tensile: Mapping[str, Floats]
+    """Fraction of time with tensile force by mesh, (n,); empty if the mesh model loses contact."""
+
+    def at(self, speed: float) -> tuple[str, ...]:
+        """Return the caveats on the amplitudes at a speed (rad/s), the nearest that was computed."""
+        point = int(np.argmin(np.abs(self.speed - abs(speed))))
+        ratios = {name: float(ratio[point]) for name, ratio in self.load_ratios.items()}
+        name = max(ratios, key=lambda bearing: ratios[bearing], default="")
+        found = []
+        if name and ratios[name] >= STRAINED:
+            text = f"dynamic load of {name} {100.0 * ratios[name]:.0f} % of its static load: outside the linear range, "
+            found.append(f"{text}too high")
+        for mesh, fraction in self.tensile.items():
+            if fraction[point] > 0.0:
+                text = f"tensile force of {mesh} for {100.0 * float(fraction[point]):.2g} % of the time: invalid, "
+                found.append(f"{text}because contact loss is neglected")
+        return tuple(found)
+
+
+def speed_caveats(data: xr.Dataset) -> SpeedCaveats:
+    """Return the caveats at each speed of a response."""
+    tensile = {} if LAWS[str(data.attrs["mesh_model"])].loses_contact else tensile_fractions(data)
+    return SpeedCaveats(np.abs(data["speed"].to_numpy()), dynamic_load_ratios(data), tensile)
 
 
 def is_excited(data: xr.Dataset) -> bool:

@@ -234,18 +234,21 @@ def pulls(data: xr.Dataset) -> tuple[TensileMesh, ...]:
     ----------
     data : as `exugear.steady.steady_file.load_response` reads it
     """
-    names = [str(name) for name in data["signal"].to_numpy()]
-    places: dict[str, list[int]] = {}
-    for place, name in enumerate(names):
-        if name.startswith("mesh_force "):
-            places.setdefault(name.split(" ")[1], []).append(place)
     found = []
-    for mesh, signals in places.items():
-        shares = _pulling(data, signals)
+    for mesh, shares in tensile_fractions(data).items():
         most = int(np.argmax(shares))
         if shares[most] > 0.0:
             found.append(TensileMesh(mesh, int((shares > 0.0).sum()), float(data["speed"][most]), float(shares[most])))
     return tuple(sorted(found, key=lambda pull: -pull.share))
+
+
+def tensile_fractions(data: xr.Dataset) -> dict[str, Floats]:
+    """Return the fraction of time with tensile force at each speed (n,), by mesh or family of planet meshes."""
+    places: dict[str, list[int]] = {}
+    for place, name in enumerate(map(str, data["signal"].to_numpy())):
+        if name.startswith("mesh_force "):
+            places.setdefault(name.split(" ")[1], []).append(place)
+    return {mesh: _pulling(data, signals) for mesh, signals in places.items()}
 
 
 def _pulling(data: xr.Dataset, places: list[int]) -> Floats:
@@ -288,18 +291,24 @@ def bearing_swings(data: xr.Dataset) -> tuple[BearingLoadExcursion, ...]:
     ----------
     data : as `exugear.steady.steady_file.load_response` reads it
     """
-    names = [str(name) for name in data["signal"].to_numpy()]
     swings = []
-    for bearing, static in json.loads(data.attrs["bearing_static_loads"]).items():
-        signals = [f"support_force {bearing} {axis}" for axis in "xyz"]
-        if not set(signals) <= set(names):
-            continue
-        shares = _swinging(data, [names.index(name) for name in signals], np.array(static))
+    for bearing, shares in dynamic_load_ratios(data).items():
         most = int(np.nanargmax(shares))
         if shares[most] >= STRAINED:
             count = int((shares >= STRAINED).sum())
             swings.append(BearingLoadExcursion(bearing, count, float(data["speed"][most]), float(shares[most])))
     return tuple(sorted(swings, key=lambda swing: -swing.share))
+
+
+def dynamic_load_ratios(data: xr.Dataset) -> dict[str, Floats]:
+    """Return dynamic over static load at each speed (n,) of the bearings that `bearing_swings` checks."""
+    names = [str(name) for name in data["signal"].to_numpy()]
+    ratios = {}
+    for bearing, static in json.loads(data.attrs["bearing_static_loads"]).items():
+        signals = [f"support_force {bearing} {axis}" for axis in "xyz"]
+        if set(signals) <= set(names):
+            ratios[bearing] = _swinging(data, [names.index(name) for name in signals], np.array(static))
+    return ratios
 
 
 def _swinging(data: xr.Dataset, places: list[int], static: Floats) -> Floats:

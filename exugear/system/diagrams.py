@@ -9,7 +9,7 @@ import numpy as np
 
 from exugear.gearbox.units import RPM
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.drawing import COLOURS, axes_or_new, drawable
+from fe_ste.tools.drawing import COLOURS, axes_or_new, drawable, order_styles
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,15 +31,15 @@ def draw_campbell(
     panel.grid(False)
     for mode in modes[modes <= top]:
         panel.axhline(1e-3 * mode, color="#BBBBBB", linewidth=0.8, zorder=1)
-    for number, (name, order) in enumerate(orders.items()):
-        colour = COLOURS[number % len(COLOURS)]
+    for name, style in order_styles(list(orders)).items():
+        order = orders[name]
         end = order * fastest / (2.0 * np.pi)
         reach = min(1.0, top / end)
         label = drawable(name)
-        panel.plot([0.0, reach * end_speed], [0.0, 1e-3 * reach * end], color=colour, label=label, zorder=2)
+        panel.plot([0.0, reach * end_speed], [0.0, 1e-3 * reach * end], label=label, zorder=2, **style)
         crossed = (modes <= reach * end) & (modes > 0.0)
         speeds = end_speed * modes[crossed] / end
-        panel.scatter(speeds, 1e-3 * modes[crossed], s=8.0 + 60.0 * weights[crossed], color=colour, zorder=3)
+        panel.scatter(speeds, 1e-3 * modes[crossed], s=8.0 + 60.0 * weights[crossed], color=style["color"], zorder=3)
     panel.set(xlim=(0.0, end_speed), ylim=(0.0, 1e-3 * top))
     panel.set(xlabel="Input speed / rpm", ylabel="Frequency / kHz")
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.load_cases import operating_range
 from exugear.gearbox.versions import MODES
 from exugear.system.bodies.elastic_body import ElasticBody
 from exugear.system.bodies.reduction import TILT_X, TILT_Y, UX, UY, UZ, ReducedBody
@@ -31,7 +32,7 @@ from exugear.system.tooth_mesh.element import Angles, MeshData
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Booleans, Complexes, Floats
 from fe_ste.tools.display import ReprMixin, TitledRows
-from fe_ste.tools.drawing import axes_or_new
+from fe_ste.tools.drawing import COLUMN_WIDTHS, axes_or_new, label_curves
 from fe_ste.tools.stores import Layout, Store, load_dataset, write_dataset
 
 if TYPE_CHECKING:
@@ -234,9 +235,9 @@ class Modes(ReprMixin):
         Parameters
         ----------
         kind
-            ``campbell``: modes with more than 0.1 % participation in the overall transmission error, and mesh orders;
-            size of a mark: participation. ``energies``: share of the kinetic energy by body and of the strain energy
-            by element.
+            ``campbell``: modes with more than 0.1 % participation in the overall transmission error, and mesh
+            orders up to the end of the operating range; size of a mark: participation. ``energies``:
+            share of the kinetic energy by body and of the strain energy by element.
         ax : matplotlib axes; by default new ones, whose ``ax.figure`` can be shown and saved
 
         Raises
@@ -260,15 +261,17 @@ class Modes(ReprMixin):
         gearbox = self.assembly.gearbox
         shares = participation(self.overall)
         seen = (self.frequency > 0.0) & (shares >= VISIBLE)
-        highest = max(gearbox.train.mesh_frequencies(1.0).values(), default=0.0)
+        orders = gearbox.mesh_orders()
+        highest = max(orders.values(), default=0.0) / (2.0 * np.pi)
         top = 1.1 * float(max(self.frequency[seen], default=1.0))
         fastest = top / highest if highest else 1.0
+        if (operation := operating_range(gearbox)) is not None:
+            fastest = operation[1]
+            top = min(top, 1.05 * highest * fastest) if highest else top
         weights = (shares[seen] / max(float(shares.max(initial=0.0)), 1e-300)) ** 0.5
-        orders = gearbox.mesh_orders()
-        with axes_or_new(ax, 7.2, 5.0) as panel:
+        with axes_or_new(ax, COLUMN_WIDTHS[2], 5.0) as panel:
             draw_campbell(panel, self.frequency[seen], orders, fastest, top, weights)
-            if orders:
-                panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
+            label_curves(panel)
             return panel
 
     def to_dataset(self) -> xr.Dataset:

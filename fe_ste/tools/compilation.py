@@ -11,6 +11,8 @@ import hashlib
 import logging
 import os
 import shutil
+import stat
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -91,6 +93,8 @@ def kernel_folder() -> Path | None:
     cast(Any, event).register("numba:compile", _Announcement())
     for place in _places():
         with suppress(OSError):
+            if not _is_closed_to_others(place):
+                continue
             folder = place / (_FOLDER + _digest())
             folder.mkdir(parents=True, exist_ok=True)
             tempfile.TemporaryFile(dir=folder).close()
@@ -143,6 +147,19 @@ def _places() -> Iterator[Path]:
     import platformdirs  # seldom needed: not worth its time at each start
 
     yield platformdirs.user_cache_path("exugear", appauthor=False)
+
+
+def _is_closed_to_others(folder: Path) -> bool:
+    """Return whether no other user but root can put files into a folder, or replace it: its content is executed."""
+    if sys.platform == "win32":
+        return True  # profiles are closed to other users
+    for level in (folder, *folder.resolve().parents):
+        with suppress(FileNotFoundError):  # will be made by this process
+            status = level.stat()
+            open_to_all = bool(status.st_mode & stat.S_IWOTH) and not status.st_mode & stat.S_ISVTX
+            if open_to_all or status.st_uid not in (0, os.getuid()):
+                return False
+    return True
 
 
 def _digest() -> str:

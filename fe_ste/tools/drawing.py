@@ -14,7 +14,7 @@ import io
 import math
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,6 +33,10 @@ if TYPE_CHECKING:
 #: Colours that stay apart in print and for colour-blind readers (Okabe and Ito).
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 WARNING_COLOUR = "#D0021B"
+#: Dashes of the first harmonic of a mesh, the second, the third, and all higher ones.
+DASHES: tuple[Any, ...] = ("-", (0, (6, 2)), (0, (2, 1.5)), (0, (6, 1.5, 1.5, 1.5)))
+#: Width of a picture in one and in two columns of a paper, inches (about 89 and 183 mm).
+COLUMN_WIDTHS = {1: 3.5, 2: 7.2}
 #: Points of an inch that files of pictures have.
 _DPI = 200
 
@@ -68,6 +72,89 @@ def new_figure(width: float, height: float) -> Figure:
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
+
+
+def paper_axes(columns: int = 1, height: float | None = None) -> Axes:
+    """Return new axes in the style of this project, of the width of one or two columns of a paper.
+
+    Parameters
+    ----------
+    columns : 1 or 2
+    height : inches; by default three quarters of the width for one column, and half of it for two
+
+    Examples
+    --------
+    >>> ax = paper_axes(1)
+    >>> ax.figure.get_size_inches().tolist()
+    [3.5, 2.625]
+    """
+    if columns not in COLUMN_WIDTHS:
+        raise ValueError(f"columns = {columns!r}: must be 1 or 2")
+    width = COLUMN_WIDTHS[columns]
+    with drawing_style():
+        return new_figure(width, height or width * (0.75 if columns == 1 else 0.5)).add_subplot()
+
+
+def order_styles(names: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Return how the curve of each order is drawn: its colour by the mesh, its dash by the harmonic.
+
+    Parameters
+    ----------
+    names : of orders, such as ``sun_planet`` and ``2 × sun_planet``; any other name counts as a mesh
+
+    Examples
+    --------
+    >>> styles = order_styles(["sun", "2 × sun", "ring"])
+    >>> styles["sun"]["color"] == styles["2 × sun"]["color"], styles["ring"]["color"] == styles["sun"]["color"]
+    (True, False)
+    >>> styles["sun"]["linestyle"], styles["ring"]["linestyle"]
+    ('-', '-')
+    """
+    meshes: dict[str, int] = {}
+    styles = {}
+    for name in names:
+        number, _, mesh = name.replace(" x ", " × ").partition(" × ")
+        harmonic = int(number) if number.isdigit() else 1
+        place = meshes.setdefault(mesh if number.isdigit() else name, len(meshes))
+        dash = DASHES[min(max(harmonic, 1), len(DASHES)) - 1]
+        styles[name] = {"color": COLOURS[place % len(COLOURS)], "linestyle": dash}
+    return styles
+
+
+def label_curves(panel: Axes) -> None:
+    """Write the label of each curve at its right end, in its colour, apart from the next; no legend is needed.
+
+    Labels that would overlap are moved up or down as far as necessary.
+    """
+    curves = []
+    for curve in panel.get_lines():
+        x, y = (np.asarray(values, dtype=np.float64) for values in curve.get_data())
+        drawn = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
+        if not str(curve.get_label()).startswith("_") and drawn.size:
+            curves.append((curve, x[drawn[-1]], y[drawn[-1]]))
+    if not curves:
+        return
+    to_axes = panel.transData + panel.transAxes.inverted()
+    ends = np.array([to_axes.transform((x, y)) for _, x, y in curves]).clip(0.0, 1.0)
+    size = 7.0
+    least = 1.25 * size / 72.0 / (panel.get_window_extent().height / panel.figure.dpi)
+    order = np.argsort(ends[:, 1])
+    heights = ends[order, 1]
+    for place in range(1, heights.size):
+        heights[place] = max(heights[place], heights[place - 1] + least)
+    heights -= max(0.0, heights[-1] - 1.0)
+    for place, index in enumerate(order):
+        panel.annotate(
+            str(curves[index][0].get_label()),
+            (ends[index, 0], heights[place]),
+            (4, 0),
+            xycoords="axes fraction",
+            textcoords="offset points",
+            va="center",
+            fontsize=size,
+            color=curves[index][0].get_color(),
+            annotation_clip=False,
+        )
 
 
 @contextmanager

@@ -391,16 +391,15 @@ def view(
     inertias: options.InertiasOption = None,
     near: Annotated[
         float | None,
-        typer.Option(
-            min=0.0, metavar="HZ", help="Show the mode nearest to this frequency first. (default: gearbox file)"
-        ),
+        typer.Option(min=0.0, metavar="HZ", help="Show the mode nearest to this frequency first."),
     ] = None,
     resonance: Annotated[
         int | None,
         typer.Option(
             min=1,
             metavar="N",
-            help="Show the vibration in operation at this resonance of the ranking of exugear steady first.",
+            help="Show the vibration in operation at this resonance of the ranking of exugear steady first. (default: "
+            "1; without a steady-state response a mode)",
             show_default=False,
         ),
     ] = None,

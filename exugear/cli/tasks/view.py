@@ -39,6 +39,8 @@ from fe_ste.tools.files import FileError
 
 SHOWN_ENERGIES = 3
 """Number of listed fractions of the strain energy."""
+FIRST = 0
+"""Stands for the first resonance of the ranking whose state is found again; a mode if there is none."""
 SHOWN_RESONANCES = 10
 """Number of listed resonances of the ranking."""
 
@@ -75,7 +77,9 @@ def view(
         about = ""
     wanted = project.gearbox.case.report.reference_frequency_Hz if near is None else near
     first = int(modes.overall.argmax()) if wanted is None else modes.nearest(wanted)
-    written = _draw(modes, headline, about, folder, first, resonance, animation)
+    # Without a choice the first resonance in operation is shown, or else a mode.
+    leads = FIRST if resonance is None and near is None else resonance
+    written, resonance = _draw(modes, headline, about, folder, first, leads, animation)
     shown = {"mode": first + 1} if resonance is None else {"resonance": resonance}
     page, *pictures = written
     Outcome(
@@ -107,8 +111,13 @@ def _draw(
     first: int,
     resonance: int | None,
     animation: bool,
-) -> list[Path]:
-    """Write the page of all elastic modes and resonances, and pictures of what it shows first."""
+) -> tuple[list[Path], int | None]:
+    """Write the page of all elastic modes and resonances, and pictures of what it shows first.
+
+    Returns
+    -------
+    files, and the number of the resonance that is shown first; None for a mode
+    """
     assembly = modes.assembly
     words = Labels(assembly.gearbox)
     ranked: tuple[Resonance, ...] = ()
@@ -124,6 +133,8 @@ def _draw(
     mode_rows = _mode_rows(modes, words, headline, ranked)
     places = [row.number - 1 for row in mode_rows]
     shown = places.index(first) if first in places else 0
+    if resonance == FIRST:
+        resonance = next((row.number for row in resonances), None)
     if resonance is None:
         title = f"{modes.frequency[places[shown]]:.0f} Hz: {modes.names[places[shown]]}"
         picture = folder / f"mode_{places[shown] + 1}"
@@ -147,7 +158,7 @@ def _draw(
         first=shown,
         labels=words.labels,
     )
-    return [page, *_draw_pictures(assembly, shape, title, picture, animation)]
+    return [page, *_draw_pictures(assembly, shape, title, picture, animation)], resonance
 
 
 def _mode_rows(modes: Modes, words: Labels, headline: Headline | None, ranked: Sequence[Resonance]) -> list[ModeRow]:

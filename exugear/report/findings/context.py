@@ -327,3 +327,11 @@ def excitations(context: Context, results: StoredResults) -> tuple[PairExcitatio
             )
         )
     return tuple(found)
+
+
+def shown_path(path: str | Path) -> str:
+    """Return a path from the current folder, or its name: the page does not show where it is on this machine."""
+    absolute = Path(path).absolute()
+    if absolute.is_relative_to(Path.cwd()):
+        return str(absolute.relative_to(Path.cwd()))
+    return absolute.name

@@ -138,6 +138,8 @@ class RunGroup:
     in_operation: Ranking = field(kw_only=True)
     """Resonances of the main variant in the operating range: those of its steady-state response, ranked by three
     quantities, or else those of the run-up."""
+    rankings: Mapping[str, Ranking] = field(kw_only=True)
+    """By variant, resonances in the operating range: of its steady-state response, or of the run-up alone."""
     response: xr.Dataset | None = field(kw_only=True)
     """Steady-state response of the main variant that they are from; None if they are from the run-up."""
 
@@ -268,14 +270,35 @@ def _group(
     main = list(runs)[-1]
     stated = operating_range(context.gearbox)
     wanted = context.gearbox.case.report.quantity
-    in_operation = _ranking(runs[main], ranked[main], loud, stated, wanted)
-    if not in_operation.resonances and not in_operation.whole:
-        speed = runs[main].spectra.speed
-        everywhere = _ranking(runs[main], ranked[main], loud, (float(speed.min()), float(speed.max())), wanted)
-        in_operation = replace(everywhere, whole=True, without=in_operation.speeds)
+    rankings = {name: _in_operation(runs[name], ranked[name], responses.get(name), stated, wanted) for name in runs}
     return RunGroup(
-        source, *key[1:], runs, ranked, comparisons, constant, responses, in_operation=in_operation, response=loud
+        source,
+        *key[1:],
+        runs,
+        ranked,
+        comparisons,
+        constant,
+        responses,
+        in_operation=rankings[main] if responses else _in_operation(runs[main], ranked[main], loud, stated, wanted),
+        rankings=rankings,
+        response=loud,
     )
+
+
+def _in_operation(
+    run: VariantRun,
+    ranked: Sequence[RankedResonance],
+    response: xr.Dataset | None,
+    stated: tuple[float, float] | None,
+    wanted: str | None,
+) -> Ranking:
+    """Rank the resonances in the operating range, or at all speeds if there is none."""
+    found = _ranking(run, ranked, response, stated, wanted)
+    if found.resonances or found.whole:
+        return found
+    speed = run.spectra.speed
+    everywhere = _ranking(run, ranked, response, (float(speed.min()), float(speed.max())), wanted)
+    return replace(everywhere, whole=True, without=found.speeds)
 
 
 def _ranking(
@@ -299,7 +322,8 @@ def _ranking(
 def _spectra_of_response(context: Context, data: xr.Dataset, results: StoredResults) -> VariantRun:
     """Represent a steady-state response as a run-up: its orders as spectra, its peaks as picks."""
     choice = choice_of(data.attrs)
-    spectra = response_spectra(data, ("overall_dte",), highest_drawn(context.gearbox, data))
+    ranking = ranking_of(data, operating_range(context.gearbox), context.gearbox.case.report.quantity)
+    spectra = response_spectra(data, ("overall_dte",), highest_drawn(context.gearbox, data, ranking))
     picks = pick_resonances(spectra, order_lines(context.gearbox), peaks=line_peaks)
     path = steady_path(context.folder, choice, settings_of(data.attrs))
     return VariantRun(path, data.attrs, spectra, picks, results.modes.get(choice))

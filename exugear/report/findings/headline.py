@@ -140,7 +140,7 @@ class Headline:
 
 
 def headline_of_group(group: RunGroup) -> Headline:
-    """Return the ranking of a result group."""
+    """Return the ranking of the main variant of a result group."""
     run = group.runs[group.main]
     source = group.source
     load = str(run.attributes.get("load", ""))
@@ -148,6 +148,15 @@ def headline_of_group(group: RunGroup) -> Headline:
         source = f"constant speed, {METHOD_LABELS[str(group.response.attrs['method'])]}"
         load = ""
     return Headline(group.choice(group.main), source, load, group.in_operation, group, group.response, run.modes)
+
+
+def headline_of_response(group: RunGroup, variant: str) -> Headline:
+    """Return the ranking of the steady-state response of any variant of a group."""
+    response = group.responses[variant]
+    source = f"constant speed, {METHOD_LABELS[str(response.attrs['method'])]}"
+    return Headline(
+        group.choice(variant), source, "", group.rankings[variant], group, response, group.runs[variant].modes
+    )
 
 
 def headline_of(context: Context, results: StoredResults, groups: Sequence[RunGroup]) -> Headline | None:

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 SAME_SPEED_TOLERANCE = 0.01
 """Relative speed difference within which peaks of one order in several quantities are one resonance."""
+AROUND = (0.8, 1.15)
+"""Speeds drawn first, as factors of the ends of the operating range."""
 MIN_RELATIVE_PEAK = 1e-9
 """Peaks below this fraction of the largest peak of their quantity are round-off."""
 MIN_EXCITED = {
@@ -174,6 +176,13 @@ class Ranking:
     def wanted(self) -> str:
         """Name of the deciding quantity in a gearbox file."""
         return next(name for name, own in DECIDING.items() if self.quantity in own)
+
+    @property
+    def around(self) -> tuple[float, float] | None:
+        """Speeds (rad/s) that diagrams show first: the operating range and a little more; None for all speeds."""
+        if self.whole:
+            return None
+        return AROUND[0] * self.speeds[0], AROUND[1] * self.speeds[1]
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -458,6 +467,8 @@ MIN_AMPLITUDE = 1e-12
 """Smallest amplitude (m) for the conversion to levels."""
 TOP = 1.1
 """Highest drawn frequency over the highest mesh frequency at the highest speed."""
+DRAWN = 10
+"""Number of resonances of the ranking that are drawn."""
 LEAST_SPEEDS = 3
 """Minimum number of speeds for diagrams over speed."""
 
@@ -559,10 +570,16 @@ def is_over_speed(response: xr.Dataset) -> bool:
     return not settings_of(response.attrs).branches and np.unique(response["speed"]).size >= LEAST_SPEEDS
 
 
-def highest_drawn(gearbox: Gearbox, response: xr.Dataset) -> float:
-    """Return the highest frequency (Hz) drawn for a steady-state response."""
+def highest_drawn(gearbox: Gearbox, response: xr.Dataset, ranking: Ranking | None = None) -> float:
+    """Return the highest frequency (Hz) drawn for a steady-state response: of the meshes, and of the first resonances.
+
+    Parameters
+    ----------
+    ranking : its first resonances are drawn, too
+    """
     fastest = float(np.abs(response["speed"]).max())
-    return TOP * max(gearbox.train.mesh_frequencies(fastest).values())
+    first = () if ranking is None else ranking.resonances[:DRAWN]
+    return TOP * max(*gearbox.train.mesh_frequencies(fastest).values(), *(own.frequency for own in first))
 
 
 def response_spectra(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -17,7 +16,16 @@ from exugear.results.spectra.waterfall import OrderLine
 from exugear.system.diagrams import draw_campbell
 from exugear.system.tooth_mesh.tables import TableRequest
 from fe_ste.pictures.teeth import contact_quads, draw_tooth_contact, meshed_teeth
-from fe_ste.tools.drawing import COLOURS, axes_or_new, drawable, drawing_style, finish_figure, new_figure
+from fe_ste.tools.drawing import (
+    COLUMN_WIDTHS,
+    axes_or_new,
+    drawable,
+    drawing_style,
+    finish_figure,
+    label_curves,
+    new_figure,
+    order_styles,
+)
 from fe_ste.transmission_error.diagrams import plot_load_share, plot_ste_curves
 from fe_ste.transmission_error.search import contact_state
 from fe_ste.transmission_error.table import MeshTable, prepared_compliance
@@ -66,8 +74,10 @@ def plot_campbell(
                     name, (fastest / RPM, 1e-3 * mode), (4, 0), textcoords="offset points", va="center", fontsize=7.0
                 )
         panel.set_title(title, loc="left")
-        if orders:
+        if orders and names:  # the names of the modes stand where the orders have theirs
             figure.legend(loc="outside upper center", ncols=4)
+        else:
+            label_curves(panel)
         return finish_figure(figure, path)
 
 
@@ -124,16 +134,18 @@ def plot_response(
     places = {own.amplitudes[quantity].place: own for own in ranking.resonances}
     ranked = {place: places[place] for place in range(1, SHOWN_RESONANCES + 1) if place in places}
     lines = {own.line: int(np.argmin(np.abs(orders - own.order))) for own in ranked.values()}
-    colours = dict(zip(lines, itertools.cycle(COLOURS), strict=False))
-    with axes_or_new(ax, 6.5, 4.0) as panel:
+    # A mesh has one colour in all diagrams.
+    known = [str(name) for name in data["line"].to_numpy() if name != "mean"]
+    styles = order_styles([*known, *lines])
+    with axes_or_new(ax, COLUMN_WIDTHS[2], 4.0) as panel:
         panel.plot(speed, factor * curves[quantity].amplitude, color="#BBBBBB", linewidth=3.0, label="highest order")
-        for name, colour in colours.items():
-            panel.plot(speed, factor * amplitude[:, lines[name]], color=colour, linewidth=1.0, label=drawable(name))
+        for name, line in lines.items():
+            panel.plot(speed, factor * amplitude[:, line], linewidth=1.0, label=drawable(name), **styles[name])
         for place, resonance in ranked.items():
             highest = resonance.amplitudes[quantity].amplitude
             point = int(np.argmin(np.abs(amplitude[:, lines[resonance.line]] - highest)))
             at = speed[point], factor * highest
-            panel.plot(*at, "o", color=colours[resonance.line], markerfacecolor="none")
+            panel.plot(*at, "o", color=styles[resonance.line]["color"], markerfacecolor="none")
             panel.annotate(str(place), at, (0, 5), textcoords="offset points", ha="center", fontsize=7.0)
         if not ranking.whole:
             panel.axvspan(*(value / RPM for value in ranking.speeds), color="#EEEEEE", zorder=0)
@@ -141,7 +153,8 @@ def plot_response(
         if highest > 0.0:
             panel.set(yscale="log", ylim=(SHOWN_RANGE * highest, 2.0 * highest))
         panel.set(xlabel="Input speed / rpm", ylabel=f"{label.title}, ± {label.unit}")
-        panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
+        panel.set_xlim(speed.min(), speed.max())
+        label_curves(panel)
         return panel
 
 

@@ -13,9 +13,13 @@ from exugear.report.pictures.speed_diagrams import Mark, round_ticks
 from fe_ste.flank_pressure import FlankPressure
 
 WIDTH, HEIGHT = 400.0, 262.0
-LEFT, RIGHT = 60.0, 390.0
-MAP = (8.0, 138.0)
+LEFT, RIGHT = 60.0, 336.0
+BAR = (350.0, 362.0)
+"""Left and right edge of the colour bar."""
+MAP = (18.0, 138.0)
 """Upper and lower edge of the pressure map."""
+SHADES = 64
+"""Number of colours of the bar."""
 LOAD = (150.0, 226.0)
 """Upper and lower edge of the diagram of the line load."""
 
@@ -42,6 +46,11 @@ class FlankMap:
     """Of the line load, N/mm."""
     words: str
     """Content as text."""
+    bar: tuple[float, float]
+    colours: str
+    """Edges of the colour bar, and the address that contains its colours as PNG."""
+    pressures: tuple[Mark, ...]
+    """Of the colour bar, MPa."""
 
 
 def flank_map(flank: FlankPressure, highest: float, heaviest: float, words: str) -> FlankMap:
@@ -69,6 +78,25 @@ def flank_map(flank: FlankPressure, highest: float, heaviest: float, words: str)
     ticks = tuple(Mark(across(1e-3 * value), LOAD[1] + 14.0, f"{value:g}".replace("-", "−")) for value in places)
     heights = round_ticks(0.0, 1e-3 * heaviest, 3)
     loads = tuple(Mark(LEFT - 5.0, upward(1e3 * value) + 3.5, f"{value:g}") for value in heights)
-    address = png_address(png(colours(shares)[::-1]))
-    mean = upward(float(flank.line_load.mean()))
-    return FlankMap(WIDTH, HEIGHT, LEFT, RIGHT, MAP, LOAD, address, f"M{curve}", mean, ticks, loads, words)
+    values = [value for value in round_ticks(0.0, 1e-6 * highest, 4) if value < 0.9e-6 * highest] + [1e-6 * highest]
+    bar_height = MAP[1] - MAP[0]
+    pressures = tuple(
+        Mark(BAR[1] + 4.0, MAP[1] - 1e6 * value / highest * bar_height + 3.5, f"{value:.0f}") for value in values
+    )
+    return FlankMap(
+        WIDTH,
+        HEIGHT,
+        LEFT,
+        RIGHT,
+        MAP,
+        LOAD,
+        picture=png_address(png(colours(shares)[::-1])),
+        curve=f"M{curve}",
+        mean=upward(float(flank.line_load.mean())),
+        ticks=ticks,
+        loads=loads,
+        words=words,
+        bar=BAR,
+        colours=png_address(png(colours(np.linspace(1.0, 0.0, SHADES)[:, None]))),
+        pressures=pressures,
+    )

@@ -12,12 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.gearbox.units import RPM
-from exugear.report.findings.ranking import Envelope, Ranking, Resonance
+from exugear.report.findings.ranking import AROUND, Envelope, Ranking, Resonance
 from exugear.results.spectra.waterfall import OrderLine
 from fe_ste.tools.arrays import Floats
 
-AROUND = (0.8, 1.15)
-"""Drawn speeds, as factors of the ends of the operating range."""
 NUMBERED = 10
 """Number of resonances in the Campbell diagram."""
 DECADES = 3.0

@@ -1,11 +1,9 @@
-"""Sections "Summary" (first resonance with cause and remedies), "Resonance ranking" and "Campbell diagram"."""
+"""Part "Answer": the first resonance with its amplitudes, cause and remedies, and what could change it."""
 
 from __future__ import annotations
 
-import math
-import shlex
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,20 +21,19 @@ from exugear.report.findings.headline import (
 )
 from exugear.report.findings.margins import shortfalls_of
 from exugear.report.findings.parameter_variations import default_place, track_mode
-from exugear.report.findings.ranking import HOUSING, SHAFTS, Envelope, Resonance, envelopes
+from exugear.report.findings.ranking import Envelope, Resonance, envelopes
 from exugear.report.findings.words import QUANTITIES, percentages, rounded_text
 from exugear.report.pictures.png import png_address
-from exugear.report.pictures.speed_diagrams import NUMBERED, CampbellDrawing, Strips, campbell_of, strips_of
+from exugear.report.pictures.speed_diagrams import Strips, strips_of
 from exugear.report.pictures.still import mode_picture
-from exugear.report.sections.changes import CHANGES_NAME, best_changes, study_of
-from exugear.report.sections.material import Part, ReportData, model_name
-from exugear.report.web.html import Cell, Table, render
+from exugear.report.sections.changes import CHANGES_NAME, best_changes, levers_command, study_of
+from exugear.report.sections.material import Part, ReportData
+from exugear.report.sections.resonances import SHOWN, note_of, sorted_quantities
+from exugear.report.web.html import render
 from exugear.report.web.stage import drawn_bodies, drawn_mode
 from exugear.steady.crossings import Contributions
 from exugear.system.modal_damping import damping_in_words
 
-SHOWN = NUMBERED
-"""Number of resonances in the ranking."""
 COUNTED = 1e-3
 """Amplitude, over the highest of its quantity, from which a peak counts in "rank 3 of 40": 60 dB."""
 AT_RATED = 0.005
@@ -49,8 +46,6 @@ SHOWN_SHORTFALLS = 2
 """Number of listed parts whose life falls short."""
 STRIPS = ((690.0, 312.0), (352.0, 440.0))
 """Sizes of the diagrams of amplitude for windows of desktops and phones."""
-CAMPBELL = ((1120.0, 520.0), (352.0, 420.0))
-"""Sizes of the Campbell diagrams."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +69,7 @@ class Box:
         return ". ".join([*parts, *(f"{change}: {gain}" for gain, change in self.changes)]) + "."
 
 
-def short_section(material: ReportData) -> Part:
+def answer_section(material: ReportData) -> Part:
     """Show the first resonance of the ranking: amplitudes, mode, cause, remedies, and what could change it."""
     headline = material.headline
     notes = material.context.notes.statements
@@ -82,14 +77,14 @@ def short_section(material: ReportData) -> Part:
         # Continuation results and responses at few speeds are not ranked.
         lines = [fact.line for data in material.results.steady for fact in facts_of_response(material.words, data)]
         notes.extend(lines)
-        return Part(render("short", answer=None, lines=lines), title="Summary", name="short")
+        return Part(render("answer", answer=None, lines=lines), title="Answer", name="answer")
     notes.append(f"Results: {_scope(material, headline)}")
     top = headline.top
     assert top is not None
     mode = headline.mode_of(top)
     known = contributions_of(material.context, headline)
     found = headline.envelopes(material.lines)
-    curves = {name: found[name] for name in _sorted_quantities(headline, top) if name in found}
+    curves = {name: found[name] for name in sorted_quantities(headline.ranking, top) if name in found}
     drawn = curves
     caption = "largest single order"
     if headline.response is not None:
@@ -103,8 +98,10 @@ def short_section(material: ReportData) -> Part:
         "speed": speed_text(top),
         "off_rated": _off_rated(material, top),
         "sentence": _sentence(material, headline, top, mode),
-        "quantities": [_quantity(material, headline, top, name) for name in _sorted_quantities(headline, top)],
-        "note": _note(material, headline),
+        "quantities": [_quantity(material, headline, top, name) for name in sorted_quantities(headline.ranking, top)],
+        "note": note_of(material, headline),
+        "caveats": _caveats(material, headline),
+        "choice": "" if headline.group is None else f"resonance:{headline.group.name}:{headline.choice.variant}:",
         "strips": [_strips(material, headline, drawn, size) for size in STRIPS if drawn],
         "drawn": caption,
         "resonance": _resonance_box(material, headline, mode),
@@ -120,11 +117,21 @@ def short_section(material: ReportData) -> Part:
     boxes = (("Mode", "resonance"), ("Cause", "cause"), ("Reduction", "remedy"))
     notes.extend(f"{title}: {answer[name].line}" for title, name in boxes)
     notes.extend(f"{title}: {line}" for title, lines in answer["further"] for line in lines)
-    return Part(
-        render("short", answer=answer, speed_label=f"{material.input_words} speed / rpm"),
-        title="Summary",
-        name="short",
-    )
+    html = render("answer", answer=answer, speed_label=f"{material.input_words} speed / rpm")
+    return Part(html, {"curves": _curves(material, drawn)}, "Answer", "answer")
+
+
+def _curves(material: ReportData, curves: Mapping[str, Envelope]) -> list[dict[str, Any]]:
+    """Return the drawn curves for the readout at the cursor."""
+    return [
+        {
+            "label": QUANTITIES[name].short,
+            "unit": QUANTITIES[name].unit,
+            "speeds": material.arrays.add((curve.speed / RPM).astype("f4")),
+            "values": material.arrays.add((QUANTITIES[name].factor * curve.amplitude).astype("f4")),
+        }
+        for name, curve in curves.items()
+    ]
 
 
 def _scope(material: ReportData, headline: Headline) -> str:
@@ -148,11 +155,6 @@ def speed_text(resonance: Resonance) -> str:
     return f"{rounded_text(abs(resonance.speed) / RPM)} rpm"
 
 
-def _range_text(headline: Headline) -> str:
-    low, high = (rounded_text(speed / RPM) for speed in headline.ranking.speeds)
-    return f"{low} to {high} rpm"
-
-
 def _kicker(headline: Headline) -> str:
     where = "at all computed speeds" if headline.ranking.whole else "within the operating range"
     highest = f"Highest {QUANTITIES[headline.ranking.quantity].column}"
@@ -160,11 +162,6 @@ def _kicker(headline: Headline) -> str:
         low, high = (rounded_text(speed / RPM) for speed in headline.ranking.without)
         return f"No resonance within the operating range, {low} to {high} rpm. {highest} at all computed speeds"
     return f"{highest} {where}"
-
-
-def _sorted_quantities(headline: Headline, resonance: Resonance) -> list[str]:
-    """Return the quantities of a resonance, that which decides the ranking first."""
-    return sorted(resonance.amplitudes, key=lambda name: name != headline.ranking.quantity)
 
 
 def _off_rated(material: ReportData, resonance: Resonance) -> str:
@@ -210,25 +207,12 @@ def _quantity(material: ReportData, headline: Headline, top: Resonance, name: st
     }
 
 
-def _note(material: ReportData, headline: Headline) -> str:
-    """Say what the amplitudes are of."""
+def _caveats(material: ReportData, headline: Headline) -> list[str]:
+    """Return what weakens the amplitudes of the first resonance."""
     if headline.group is None:
-        return "Estimate: amplification of the mode times static transmission error; exugear steady computes more."
-    if headline.response is None:
-        return "Amplitudes in the run-up; exugear steady adds bearing forces and accelerations at constant speed."
-    band = material.context.gearbox.case.damping.modal_band_percent
-    damping = "half to twice the value used" if band is None else f"{band[0]:g} to {band[1]:g} % of critical"
-    decides = QUANTITIES[headline.ranking.quantity].column
-    return f"Ranked by {decides} ({headline.ranking.reason}). Range of damping: {damping}."
-
-
-def _accelerations(headline: Headline) -> str:
-    """Say which parts the accelerations at bearings are of; empty without them."""
-    if "acceleration" not in headline.ranking.resonances[0].amplitudes:
-        return ""
-    parts = {HOUSING: "of the housing at its bearing seats", SHAFTS: "of the shafts at bearings; the housing is rigid"}
-    accelerates = parts.get(headline.ranking.accelerates, f"of {headline.ranking.accelerates} at bearings")
-    return f" Accelerations: {accelerates}."
+        return []
+    first = next(iter(material.lists[headline.group.name, headline.choice.variant]), None)
+    return [] if first is None else [material.words.labelled(text) for text in first.caveats]
 
 
 def _strips(
@@ -264,7 +248,7 @@ def _resonance_box(material: ReportData, headline: Headline, mode: MatchedMode |
             ("Strain energy", percentages(words.strain_energy(modes, mode.index), SHOWN_FRACTIONS, 0.1)),
         ],
         picture=picture,
-        link="modes",
+        link="ranking",
     )
 
 
@@ -273,7 +257,7 @@ def _cause_box(material: ReportData, top: Resonance, known: Contributions | None
     causes = causes_of(material.context, material.words, top, found, known)
     line = material.words.order(top.line, top.order)
     if not causes:
-        return Box(f"Excited by {material.words.line_sentence(line)}.", link="gears-section")
+        return Box(f"Excited by {material.words.line_sentence(line)}.", link="gears")
     first = causes[0]
     text = short(
         f"Excited by {material.words.line_sentence(line)}.",
@@ -291,7 +275,7 @@ def _cause_box(material: ReportData, top: Resonance, known: Contributions | None
     elif abs(first.overlap - round(first.overlap)) > 0.1:
         overlap += "; with a whole number the total contact length is constant"
     facts.append(("Overlap ratio", overlap))
-    return Box(text, facts, link="gears-section")
+    return Box(text, facts, link="gears")
 
 
 def _remedy_box(material: ReportData, headline: Headline) -> Box:
@@ -300,10 +284,7 @@ def _remedy_box(material: ReportData, headline: Headline) -> Box:
     if study is None and material.design_study is not None:
         return Box("The computed design changes are for another resonance, quantity or model.", link=CHANGES_NAME)
     if study is None:
-        command = shlex.join(["exugear", "report", str(material.context.folder), "--levers"])
-        if headline.response is None:
-            command = f"exugear steady, then {command}"
-        return Box(f"No design changes are computed. Run: {command}")
+        return Box(f"No design changes are computed. Run: {levers_command(material)}")
     label = QUANTITIES[study.quantity]
     changes = [(gain, material.words.labelled(words)) for gain, words in best_changes(study, SHOWN_CHANGES)]
     if not changes:
@@ -422,88 +403,3 @@ def _doubts(material: ReportData, headline: Headline, top: Resonance) -> Iterato
     places = top.amplitudes[headline.ranking.quantity].places
     if places is not None:
         yield "Damping does not change the first rank." if places[1] == 1 else f"Damping: rank 1 to {places[1]}."
-
-
-# Sections "Resonance ranking" and "Campbell diagram"
-
-
-def ranking_section(material: ReportData) -> Part:
-    """Tabulate the ranking with all quantities, with the mode of each resonance, and draw the Campbell diagram."""
-    headline = material.headline
-    if headline is None:
-        return Part()
-    shown = headline.ranking.resonances[:SHOWN]
-    rows = [_row(material, headline, number, own, shown) for number, own in enumerate(shown, start=1)]
-    title = f"Highest {len(rows)} resonances, {_range_text(headline)}"
-    table = Table(
-        rows,
-        ("excited by", "place", "mode shape"),
-        caption=title,
-        name="resonances",
-        sortable=True,
-        stacked=True,
-        hidden=("from rated / %", "place", "mode"),
-    )
-    html = render(
-        "ranking",
-        table=table,
-        whole=headline.ranking.whole,
-        note_text=_note(material, headline) + _accelerations(headline),
-        speed_label=f"{material.input_words} speed / rpm",
-        three=len(shown[0].amplitudes) > 1,
-        diagrams=[_campbell(material, headline, size) for size in CAMPBELL],
-    )
-    return Part(html, title="Ranking", name="ranking")
-
-
-def _row(
-    material: ReportData, headline: Headline, number: int, resonance: Resonance, shown: Sequence[Resonance]
-) -> dict[str, object]:
-    words = material.words
-    rated = material.context.gearbox.case.operation.rated_speed_rpm
-    rpm = abs(resonance.speed) / RPM
-    row: dict[str, object] = {
-        "No.": Cell(str(number), number, tag="rank"),
-        "speed / rpm": Cell(rounded_text(rpm), rpm),
-        "frequency / Hz": Cell(rounded_text(resonance.frequency), resonance.frequency),
-    }
-    if rated is not None:
-        off = 100.0 * (rpm / rated - 1.0)
-        row["from rated / %"] = Cell(f"{off:+.0f}".replace("-", "−").replace("+0", "0").replace("−0", "0"), off)
-    row["excited by"] = words.line(words.order(resonance.line, resonance.order))
-    for name in _sorted_quantities(headline, resonance):
-        own = resonance.amplitudes[name]
-        label = QUANTITIES[name]
-        value = label.factor * own.amplitude
-        largest = label.factor * max(other.amplitudes[name].amplitude for other in shown)
-        row[f"{label.column} ± / {label.unit}"] = Cell(rounded_text(value), value, bar=value / largest, kind=name)
-        row[f"rank, {name}"] = _number(own.place)
-        if name == headline.ranking.quantity and own.at:
-            row["place"] = words.of(own.at)
-    mode = headline.mode_of(resonance)
-    row["mode"] = _number(None)
-    row["mode shape"] = "–"
-    if mode is not None and headline.modes is not None:
-        choice = f"mode:{model_name(headline.choice)}:{mode.index}"
-        row["mode"] = replace(_number(mode.index + 1), choice=choice)
-        row["mode shape"] = words.moves(headline.modes, mode.index)
-    return row
-
-
-def _number(value: int | None) -> Cell:
-    if value is None:
-        return Cell("–", math.nan)
-    return Cell(str(value), value)
-
-
-def _campbell(material: ReportData, headline: Headline, size: tuple[float, float]) -> CampbellDrawing:
-    matched = {
-        number: mode.index
-        for number, own in enumerate(headline.ranking.resonances[:SHOWN], start=1)
-        if (mode := headline.mode_of(own)) is not None
-    }
-    frequencies = np.zeros(0) if headline.modes is None else headline.modes["frequency"].to_numpy()
-    lines = [(line, material.words.line(line)) for line in material.lines]
-    rated = material.context.gearbox.case.operation.rated_speed_rpm
-    words = "Orders are lines through the origin, modes are horizontal lines; the ranking numbers the circles."
-    return campbell_of(headline.ranking, lines, frequencies, matched, rated, size, words)

@@ -1,9 +1,12 @@
-"""Section "Bearing forces and accelerations": dynamic forces, seat accelerations and static bearing loads."""
+"""Part "Bearings and life": dynamic forces, accelerations, static loads, and lives under the load spectrum."""
 
 from __future__ import annotations
 
+import io
+import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,9 +14,12 @@ import xarray as xr
 
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
+from exugear.life.life import LEAST_OUTSIDE
+from exugear.life.life_file import draw_life, limits
 from exugear.report.findings.context import METHOD_LABELS, choice_of, model_label
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.words import figure_text
+from exugear.report.pictures.png import png_address
 from exugear.report.sections.material import Part, ReportData, model_name
 from exugear.report.web.html import Cell, Table, render
 from exugear.steady.peaks import line_name
@@ -24,7 +30,7 @@ from exugear.system.operating_points import bearing_duties, mesh_duties
 from exugear.system.statics import BalanceError
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.contact_state import MeshLoadState
-from fe_ste.tools.display import life_text, without_round_off
+from fe_ste.tools.display import LONGEST_LIFE, life_text, without_round_off
 
 CONTACT_LOSS_RATIO = 1.0
 """Dynamic over mean force above which a linear bearing model would lose contact; the page warns then."""
@@ -48,10 +54,20 @@ def bearings_section(material: ReportData) -> Part:
     forces = list(filter(None, forces))
     accelerations = list(filter(None, (_accelerations(material, data) for data in material.results.steady)))
     duties = list(filter(None, (_duties(material, assembly) for assembly in material.context.assemblies.values())))
-    if not (forces or accelerations or duties):
-        return Part()
-    html = render("bearings", forces=forces, accelerations=accelerations, seats=SEATS, duties=duties)
-    return Part(html, title="Bearing forces and accelerations", name="bearings")
+    lives = [_rated_variant(material, data) for data in material.ratings.lives]
+    data = {} if material.ratings.sheet is None else {"rating": material.ratings.sheet.summary()}
+    _note_damage(material)
+    if not (forces or accelerations or duties or lives):
+        return Part(data=data)
+    html = render(
+        "bearings",
+        forces=forces,
+        accelerations=accelerations,
+        seats=SEATS,
+        duties=duties,
+        lives=lives,
+    )
+    return Part(html, data, "Bearings and life", "bearings")
 
 
 def _forces(data: Mapping[str, Any], group: RunGroup, variant: str) -> dict[str, Any] | None:
@@ -79,12 +95,6 @@ def _forces(data: Mapping[str, Any], group: RunGroup, variant: str) -> dict[str,
             hidden=("mean axial force / kN",),
             sortable=True,
         ),
-        "lifting": [
-            f"{figures['words']}: dynamic force amplitude {100.0 * figures['amplitude'] / figures['mean']:.0f} % of "
-            "the mean force. A linear bearing model neglects loss of contact."
-            for figures in loudest.values()
-            if figures["mean"] and figures["amplitude"] > CONTACT_LOSS_RATIO * figures["mean"]
-        ],
     }
 
 
@@ -95,6 +105,7 @@ def _force_row(
     mean = figures["mean"] or 0.0
     copies = f" (1 of {figures['copies']})" if figures["copies"] > 1 else ""
     share = amplitude / mean if mean else math.nan
+    lifts = "larger than the mean force: a linear bearing model neglects loss of contact"
     named = Cell(f"{figures['words']}{copies}", choice=f"channel:{group.name}:{variant}:{name}")
     swings = Cell(figure_text(1e-3 * amplitude), 1e-3 * amplitude, bar=amplitude / largest)
     measures = {"amplitude / kN": swings}
@@ -105,7 +116,9 @@ def _force_row(
             "mean axial force / kN": Cell(figure_text(axial), axial),
             **measures,
             ("amplitude over mean / %"): Cell(
-                figure_text(100.0 * share, 2) if math.isfinite(share) else "–", 100.0 * share
+                figure_text(100.0 * share, 2) if math.isfinite(share) else "–",
+                100.0 * share,
+                caveat=lifts if share > CONTACT_LOSS_RATIO else "",
             ),
         }
     return {
@@ -168,7 +181,8 @@ def _accelerations(material: ReportData, data: xr.Dataset) -> dict[str, Any] | N
         f"{METHOD_LABELS[str(data.attrs['method'])]}"
     )
     name = f"seats-{model_name(choice_of(data.attrs))}-{data.attrs['method']}"
-    return {"title": title, "table": Table(rows, ("at", "order"), caption=title, name=name, sortable=True)}
+    table = Table(rows, ("at", "order"), caption=title, name=name, sortable=True)
+    return {"model": model_name(choice_of(data.attrs)), "title": title, "table": table}
 
 
 def _duties(material: ReportData, assembly: Assembly) -> dict[str, Any] | None:
@@ -186,6 +200,7 @@ def _duties(material: ReportData, assembly: Assembly) -> dict[str, Any] | None:
     # Without solved tooth contact there is no load distribution along the face.
     meshes = mesh_duties(assembly) if assembly.contacts.contacts else ()
     return {
+        "model": label,
         "name": name,
         "table": Table(rows, ("model",), caption=f"Bearings at the static load, {name}", name=f"duties-{label}"),
         "remarks": [f"{material.words.of(duty.name)}: {remark}." for duty, remark in said],
@@ -240,3 +255,121 @@ def _duty_row(material: ReportData, duty: BearingLoadState) -> dict[str, object]
 
 def _life(value: float) -> Cell:
     return Cell(life_text(value) if math.isfinite(value) else "no load", value)
+
+
+# Lives under the load spectrum
+
+LEAST_DAMAGE = 1e-6
+"""Damages below this value are shown as "below" it."""
+
+
+def _note_damage(material: ReportData) -> None:
+    """Note the largest damage of each rated variant."""
+    for life in material.ratings.lives:
+        worst = limits(life)
+        if worst:
+            part, kind, damage = worst[0]
+            size = "infinite" if math.isinf(damage) else f"{damage:.3g}"
+            material.context.notes.statements.append(
+                f"{model_label(choice_of(life.attrs))}: largest fatigue damage in "
+                f"{float(life.attrs['life_years']):g} years: {material.words.labelled(part)}, {size} ({kind})."
+            )
+
+
+def _rated_variant(material: ReportData, data: xr.Dataset) -> dict[str, Any]:
+    labelled = material.words.labelled
+    data = data.assign_coords(
+        {key: [labelled(str(own)) for own in data[key].to_numpy()] for key in ("flank", "bearing")}
+    )
+    name = model_label(choice_of(data.attrs))
+    label = f"life-{data.attrs['variant']}-{data.attrs['mesh_model']}"
+
+    remarks = {labelled(bearing): said for bearing, said in json.loads(data.attrs["bearing_remarks"]).items()}
+
+    def listed(*keys: str) -> list[str]:
+        return [labelled(line) for key in keys for line in json.loads(data.attrs[key])]
+
+    bearings = _bearing_rows(data, remarks)
+    content = io.BytesIO()
+    draw_life(data).savefig(content, format="png", dpi=130)
+    return {
+        "model": model_name(choice_of(data.attrs)),
+        "title": f"{name[0].upper()}{name[1:]}, gears to {data.attrs['edition']}",
+        "failures": listed("failures"),
+        "shortfalls": listed("shortfalls"),
+        "reliefs": listed("reliefs"),
+        "picture": png_address(content.getvalue()),
+        "words": f"Limiting parts, {name}",
+        "gears": Table(_flank_rows(data), caption=f"Gears, {name}", name=f"{label}-gears", sortable=True),
+        "bearings": Table(bearings, caption=f"Bearings, {name}", name=f"{label}-bearings", sortable=True),
+        "remarks": [f"{bearing}: {remark}" for bearing, said in remarks.items() for remark in said],
+        "rested": listed("assumptions", "unrated"),
+    }
+
+
+def _flank_rows(data: xr.Dataset) -> list[dict[str, Any]]:
+    """Return the rows of flanks; load that is not rated weakens their stresses and safety factors."""
+    columns = {
+        "σ_H life / MPa": ("contact_stress", 1e-6, ".0f"),
+        "σ_H0 / MPa": ("nominal_contact", 1e-6, ".0f"),
+        "outside the path / %": ("outside", 100.0, ".1f"),
+        "K_Hbeta": ("face_load", 1.0, ".3f"),
+        "pitting damage": ("contact_damage", 1.0, ".3g"),
+        "S_H": ("contact_safety", 1.0, ".2f"),
+        "S_H, ISO": ("standard_contact_safety", 1.0, ".2f"),
+        "σ_F / MPa": ("root_stress", 1e-6, ".0f"),
+        "σ_F0, ISO / MPa": ("nominal_root", 1e-6, ".0f"),
+        "root damage": ("root_damage", 1.0, ".3g"),
+        "S_F": ("root_safety", 1.0, ".2f"),
+        "S_F, ISO": ("standard_root_safety", 1.0, ".2f"),
+        "static S_H": ("contact_static", 1.0, ".2f"),
+        "static S_F": ("root_static", 1.0, ".2f"),
+    }
+    rows = _rows(data, "flank", "gear, flank, mesh", columns)
+    for row, outside in zip(rows, data["flank_outside"].to_numpy().tolist(), strict=True):
+        if outside > LEAST_OUTSIDE:
+            text = f"{100.0 * outside:.1f} % of the load is outside the path of contact, where no stress is rated"
+            for title in ("σ_H life / MPa", "S_H"):
+                row[title] = replace(row[title], caveat=text)
+    return rows
+
+
+def _bearing_rows(data: xr.Dataset, remarks: Mapping[str, Sequence[str]]) -> list[dict[str, Any]]:
+    """Return the rows of bearings; remarks on one are next to its life."""
+    columns = {
+        "largest load / kN": ("largest_load", 1e-3, ".4g"),
+        "equivalent load / kN": ("equivalent", 1e-3, ".4g"),
+        "L10 / h": ("basic_hours", 1.0, ".3g"),
+        "L10r / h": ("reference_hours", 1.0, ".3g"),
+        "L10m / h": ("modified_hours", 1.0, ".3g"),
+        "κ": ("viscosity_ratio", 1.0, ".2g"),
+        "minimum load / kN": ("minimum_load", 1e-3, ".3g"),
+        "damage (L10)": ("damage", 1.0, ".3g"),
+        "damage (L10r)": ("reference_damage", 1.0, ".3g"),
+        "contact stress / MPa": ("pressure", 1e-6, ".0f"),
+        "S_0": ("static_safety", 1.0, ".2f"),
+    }
+    rows = _rows(data, "bearing", "bearing", columns)
+    for row in rows:
+        row["L10 / h"] = replace(row["L10 / h"], caveat="; ".join(remarks.get(str(row["bearing"]), ())))
+    return rows
+
+
+def _rows(data: xr.Dataset, name: str, first: str, columns: dict[str, tuple[str, float, str]]) -> list[dict[str, Any]]:
+    return [
+        {first: label, **{title: _cell(data, name, place, *column) for title, column in columns.items()}}
+        for place, label in enumerate(data[name].to_numpy().tolist())
+    ]
+
+
+def _cell(data: xr.Dataset, name: str, place: int, key: str, factor: float, form: str) -> Cell:
+    value = factor * float(data[f"{name}_{key}"][place])
+    if math.isnan(value):
+        return Cell("–", value)
+    if math.isinf(value):
+        return Cell("infinite", value)
+    if key.endswith("damage") and value < LEAST_DAMAGE:
+        return Cell(f"below {LEAST_DAMAGE:g}", value)
+    if key.endswith("hours"):
+        return Cell(figure_text(float(format(value, form))) if value <= LONGEST_LIFE else life_text(value), value)
+    return Cell(format(without_round_off(value), form), value)

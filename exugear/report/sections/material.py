@@ -19,6 +19,7 @@ from exugear.report.findings.headline import Headline
 from exugear.report.findings.other_design import OtherDesign
 from exugear.report.findings.parameter_variations import ModelVariations
 from exugear.report.findings.ratings import Ratings
+from exugear.report.findings.resonance_list import ListedResonance
 from exugear.report.findings.words import Labels
 from exugear.report.web.document import ArrayStore
 from exugear.report.web.html import Figure
@@ -66,12 +67,16 @@ class ReportData:
     """Ranking that the report leads with; None if nothing is ranked."""
     arrays: ArrayStore
     """Store for the arrays of the page."""
+    lists: Mapping[tuple[str, str], tuple[ListedResonance, ...]]
+    """List of resonances by result group and variant."""
     ratings: Ratings = field(default_factory=Ratings)
     """Stored lives and rating sheet."""
     design_study: DesignStudy | None = None
     """Computed design changes."""
     other_design: OtherDesign | None = None
     """Another design that is compared."""
+    missing: tuple[str, ...] = ()
+    """Results that the folder lacks, with their commands."""
     run_data: Mapping[str, Any] = field(default_factory=dict)
     """Run-ups and steady-state responses as data of the page, from `exugear.report.sections.run_data.run_data`."""
     charts: dict[str, Any] = field(default_factory=dict)
@@ -140,6 +145,17 @@ class Part:
     title: str = ""
     name: str = ""
     """Title and anchor of the entry in the table of contents; empty for none."""
+
+
+def source_words(material: ReportData, own: RunGroup) -> str:
+    """Return a label of the source and the load of a group, with the mesh model where it differs."""
+    parts = [own.source]
+    if own.responses:
+        parts.append("static load")
+    if len({group.mesh_model for group in material.groups}) > 1:
+        parts.append(MESH_MODEL_LABELS[own.mesh_model])
+    words = ", ".join(parts)
+    return words[0].upper() + words[1:]
 
 
 def group_words(groups: Sequence[RunGroup], own: RunGroup) -> str:

@@ -1,23 +1,28 @@
-"""Run-ups and steady-state responses as data of the page: waterfalls and order cuts of all channels, resonances."""
+"""Results as data of the page: waterfalls and order cuts of all channels, resonances, modes with moving bodies."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
+from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
-from exugear.report.findings.groups import Channel, RankedResonance, RunGroup, channels_of, dominant_order
+from exugear.report.findings.context import VISIBLE_SHARE, model_label
+from exugear.report.findings.groups import Channel, RunGroup, channels_of, dominant_order
 from exugear.report.findings.ranking import TOP, ConstantSpeed
-from exugear.report.findings.words import figure_text, percentages
-from exugear.report.sections.material import ReportData, group_words, model_name
+from exugear.report.findings.resonance_list import ListedResonance
+from exugear.report.findings.words import QUANTITIES, figure_text, percentages, rounded_text
+from exugear.report.sections.material import ReportData, model_name, source_words
 from exugear.report.web.document import rounded
-from exugear.results.spectra.resonances import Pick
-from exugear.results.spectra.run_spectra import VariantRun
+from exugear.report.web.stage import stage_data
+from exugear.results.spectra.run_spectra import VariantRun, report_mode
 from exugear.results.spectra.waterfall import OrderLine, Waterfall
 from fe_ste.tools.arrays import Floats
 
@@ -27,14 +32,39 @@ NO_LEVEL = -32768
 """Value in a cut where the order has no level."""
 
 
-def pooled(level: Floats, speed: Floats, columns: int, lines: int) -> Floats:
-    """Return the highest level in cells of equal speed range and several spectral lines; peaks widen to their cell.
+Knots = tuple[list[float], list[int]]
+"""Axis of the columns of a waterfall: speeds (rad/s), and the columns that begin there; linear between them."""
+
+
+def knots_of(low: float, high: float, within: tuple[float, float] | None, columns: int) -> Knots:
+    """Return an axis from `low` to `high` (rad/s) with most of its columns for the speeds `within`.
+
+    Examples
+    --------
+    >>> knots_of(0.0, 100.0, (8.0, 16.0), 100)
+    ([0.0, 8.0, 16.0, 100.0], [0, 3, 73, 100])
+    >>> knots_of(0.0, 100.0, (0.0, 100.0), 100)
+    ([0.0, 100.0], [0, 100])
+    """
+    if within is not None and within[1] - within[0] < WITHIN * (high - low):
+        ends = [low, max(within[0], low), min(within[1], high), high]
+        outside = high - low - (ends[2] - ends[1])
+        before = round((1.0 - WITHIN) * columns * (ends[1] - low) / outside)
+        middle = before + round(WITHIN * columns) if ends[2] < high else columns
+        knots = dict(zip(ends, (0, before, middle, columns), strict=True))
+        if len(knots) > 2 and all(np.diff(list(knots.values())) > 0):
+            return list(knots), list(knots.values())
+    return [low, high], [0, columns]
+
+
+def pooled(level: Floats, speed: Floats, knots: Knots, lines: int) -> Floats:
+    """Return the highest level in cells of a range of speeds and several spectral lines; peaks widen to their cell.
 
     Parameters
     ----------
     level : (n, m) dB
     speed : (n,) rad/s
-    columns : cells over the speed
+    knots : columns of cells over the speed
     lines : spectral lines per cell; an incomplete cell at the top is dropped
 
     Returns
@@ -45,15 +75,14 @@ def pooled(level: Floats, speed: Floats, columns: int, lines: int) -> Floats:
     narrow = level[:, :count:lines].copy()
     for line in range(1, lines):
         np.maximum(narrow, level[:, line:count:lines], out=narrow)
-    low = float(speed.min())
-    span = max(float(np.ptp(speed)), 1e-12)
-    cell = np.minimum(((speed - low) / span * columns).astype(np.int64), columns - 1)
+    columns = knots[1][-1]
+    cell = np.minimum(np.interp(speed, *knots).astype(np.int64), columns - 1)
     whole = np.full((columns, narrow.shape[1]), -np.inf)
     order = np.argsort(cell, kind="stable")
     filled, starts = np.unique(cell[order], return_index=True)
     whole[filled] = np.maximum.reduceat(narrow[order], starts, axis=0)
     empty = np.flatnonzero(~np.isfinite(whole[:, 0]))
-    middle = low + (empty + 0.5) * span / columns
+    middle = np.interp(empty + 0.5, knots[1], knots[0])
     whole[empty] = narrow[np.argmin(np.abs(speed[:, None] - middle), axis=0)]
     return whole
 
@@ -83,6 +112,8 @@ def tenths(levels: Floats) -> NDArray[Any]:
 
 # Run-ups and steady-state responses as data of the page
 
+WITHIN = 0.7
+"""Fraction of the columns for speeds around the operating range, and of the speeds from which that is not needed."""
 SPEEDS, CHANNEL_SPEEDS = 400, 140
 """Columns of the waterfalls of the transmission error and of the other channels."""
 STEP, CHANNEL_STEP = 0.5, 1.5
@@ -97,11 +128,23 @@ ALSO = 4
 """Maximum number of further orders listed for a resonance."""
 
 
+@dataclass(frozen=True)
+class Drawn:
+    """Part of a waterfall that is drawn."""
+
+    around: tuple[float, float] | None
+    """Speeds with most columns, rad/s."""
+    response: bool
+    """Whether it is of a steady-state response."""
+
+
 def run_data(material: ReportData) -> dict[str, Any]:
-    """Return the script data of all run-ups and steady-state responses: ``lines`` and ``groups``."""
+    """Return the script data of all run-ups, steady-state responses and modes: ``lines``, ``groups``, ``models``."""
+    modes = material.results.modes
     return {
         "lines": [_line(material, line) for line in material.lines],
         "groups": [_group(material, group) for group in material.groups],
+        "models": {model_name(model): _model(material, model, data) for model, data in modes.items()},
     }
 
 
@@ -118,25 +161,32 @@ def _line(material: ReportData, line: OrderLine) -> dict[str, Any]:
 
 
 def _group(material: ReportData, group: RunGroup) -> dict[str, Any]:
+    ranking = group.rankings[group.main]
+    low, high = (speed / RPM for speed in ranking.speeds)
     return {
         "name": group.name,
         "title": group.title,
-        "words": group_words(material.groups, group),
+        "words": source_words(material, group),
+        "inertias": group.inertias,
         "source": group.source,
         "main": group.main,
+        "range": None if ranking.whole else [rounded(low, 6), rounded(high, 6)],
         "variants": {variant: _variant(material, group, run) for variant, run in group.runs.items()},
     }
 
 
 def _variant(material: ReportData, group: RunGroup, run: VariantRun) -> dict[str, Any]:
     material.context.tell(f"channels of {run.variant}, {group.source}, {group.inertias}")
-    channels = [_overall(material, run.spectra)]
+    drawn = Drawn(group.rankings[run.variant].around, run.variant in group.responses)
+    channels = [_overall(material, run.spectra, drawn)]
     loudest: dict[str, dict[str, Any] | None] = {}
     # One channel at a time, as spectra are large.
     for channel in channels_of(run, material.words, group.responses.get(run.variant)):
-        channels.append(_channel(material, channel))
+        channels.append(_channel(material, channel, drawn))
         if channel.kind == "support":
             loudest[channel.name] = _loudest(material, channel)
+    listed = material.lists[group.name, run.variant]
+    steady = (number for number, own in enumerate(listed) if own.resonance is not None or is_found_always(own))
     return {
         "words": Variant.of(run.variant).label,
         "model": model_name(group.choice(run.variant)),
@@ -144,66 +194,49 @@ def _variant(material: ReportData, group: RunGroup, run: VariantRun) -> dict[str
         "channels": channels,
         "loudest": loudest,
         "constant": _constant(material, group.constant.get(run.variant)),
-        "resonances": [_resonance(material, group, run, own) for own in group.ranked[run.variant]],
-        "first": _first(group, run.variant),
-        "leading": _leading(material, group, run.variant),
+        "resonances": [_resonance(material, group, run, own) for own in listed],
+        "first": next(steady, 0),
     }
 
 
-def _first(group: RunGroup, variant: str) -> int:
-    """Return the place of the resonance that is chosen first: that of the ranking, or else the highest steady one.
-
-    It is -1 where the first resonance of the ranking is no peak of the transmission error.
-    """
-    ranked = group.ranked[variant]
-    if variant == group.main and group.response is not None and group.in_operation.resonances:
-        return next((number for number, own in enumerate(ranked) if group.is_leading(group.shown_peak(own))), -1)
-    leading = (number for number, own in enumerate(ranked) if group.is_leading(group.shown_peak(own)))
-    steady = (number for number, own in enumerate(ranked) if own.steady)
-    return next(leading, next(steady, 0))
+def is_found_always(own: ListedResonance) -> bool:
+    """Return whether a resonance is found with all window lengths; at constant speed there are no windows."""
+    return own.peak is None or own.peak.steady
 
 
-def _leading(material: ReportData, group: RunGroup, variant: str) -> dict[str, int] | None:
-    """Return mode and order of the first resonance of the ranking; None if the group does not lead the page."""
-    headline = material.headline
-    if headline is None or headline.group is not group or headline.top is None or variant != group.main:
-        return None
-    mode = headline.mode_of(headline.top)
-    lines = [n for n, line in enumerate(material.lines) if math.isclose(line.order, headline.top.order, rel_tol=1e-6)]
-    if mode is None or not lines:
-        return None
-    return {"mode": mode.index, "line": lines[0]}
-
-
-def _highest(material: ReportData, spectra: Waterfall) -> int:
-    """Return the number of spectral lines that are drawn."""
+def _highest(material: ReportData, spectra: Waterfall, response: bool) -> int:
+    """Return the number of spectral lines that are drawn: all of a response, which has only these."""
+    if response:
+        return len(spectra.frequency)
     fundamental = max(material.context.gearbox.train.mesh_frequencies(2.0 * math.pi).values(), default=math.inf)
     top = TOP * fundamental * float(spectra.speed.max()) / (2.0 * math.pi)
     return max(4, int(np.searchsorted(spectra.frequency, min(top, float(spectra.frequency[-1])))))
 
 
-def _overall(material: ReportData, spectra: Waterfall) -> dict[str, Any]:
-    count = _highest(material, spectra)
-    level = pooled(spectra.level[:, :count], spectra.speed, SPEEDS, 1)
+def _overall(material: ReportData, spectra: Waterfall, drawn: Drawn) -> dict[str, Any]:
+    count = _highest(material, spectra, drawn.response)
+    knots = knots_of(float(spectra.speed.min()), float(spectra.speed.max()), drawn.around, SPEEDS)
+    level = pooled(spectra.level[:, :count], spectra.speed, knots, 1)
     return {
         "name": "overall",
         "words": "Overall transmission error",
         "unit": "µm",
-        **_cells(material, level, spectra, _floor(spectra, count), STEP, 1),
+        **_cells(material, level, spectra, _floor(spectra, count), knots, STEP, 1),
         **_cuts(material, spectra, 1),
     }
 
 
-def _channel(material: ReportData, channel: Channel) -> dict[str, Any]:
+def _channel(material: ReportData, channel: Channel, drawn: Drawn) -> dict[str, Any]:
     spectra = channel.spectra
-    count = _highest(material, spectra)
-    level = pooled(spectra.level[:, :count], spectra.speed, CHANNEL_SPEEDS, CHANNEL_LINES)
+    count = _highest(material, spectra, drawn.response)
+    knots = knots_of(float(spectra.speed.min()), float(spectra.speed.max()), drawn.around, CHANNEL_SPEEDS)
+    level = pooled(spectra.level[:, :count], spectra.speed, knots, CHANNEL_LINES)
     copies = f", 1 of {channel.copies}" if channel.copies > 1 else ""
     return {
         "name": channel.name,
         "words": f"Force: {channel.words}{copies}",
         "unit": "N",
-        **_cells(material, level, spectra, _floor(spectra, count), CHANNEL_STEP, CHANNEL_LINES),
+        **_cells(material, level, spectra, _floor(spectra, count), knots, CHANNEL_STEP, CHANNEL_LINES),
         **_cuts(material, spectra, CUTS_EVERY),
     }
 
@@ -214,16 +247,15 @@ def _floor(spectra: Waterfall, count: int) -> float:
 
 
 def _cells(
-    material: ReportData, level: Floats, spectra: Waterfall, floor: float, step: float, lines: int
+    material: ReportData, level: Floats, spectra: Waterfall, floor: float, knots: Knots, step: float, lines: int
 ) -> dict[str, Any]:
-    span = [float(spectra.speed.min()) / RPM, float(spectra.speed.max()) / RPM]
     return {
         "cells": material.arrays.add(level_bytes(level, floor, step)),
         "floor": floor,
         "step": step,
         "spacing": rounded(lines * float(spectra.frequency[1]), 9),
         "first": rounded(0.5 * (lines - 1) * float(spectra.frequency[1]), 9),
-        "span": span,
+        "knots": [[speed / RPM for speed in knots[0]], knots[1]],
     }
 
 
@@ -276,63 +308,125 @@ def _loudest(material: ReportData, channel: Channel) -> dict[str, Any] | None:
     }
 
 
-def _resonance(material: ReportData, group: RunGroup, run: VariantRun, own: RankedResonance) -> dict[str, Any]:
-    peak = group.shown_peak(own)
-    resonance = own.finding.resonance
+def _resonance(material: ReportData, group: RunGroup, run: VariantRun, own: ListedResonance) -> dict[str, Any]:
+    orders = [line.order for line in material.lines]
+    line = next((n for n, order in enumerate(orders) if math.isclose(order, own.line.order, rel_tol=1e-6)), -1)
+    tolerance = own.peak.finding.resonance.resolution if own.peak is not None and not group.responses else None
     return {
-        "frequency": rounded(resonance.frequency, 6),
-        "tolerance": rounded(resonance.resolution, 3),
-        "speed": rounded(peak.speed / RPM, 5),
-        "peak": rounded(peak.frequency, 6),
-        "line": [line.name for line in material.lines].index(peak.line.name),
-        "level": rounded(peak.level, 4),
-        "steady": own.steady,
-        "mode": own.finding.mode,
-        "facts": _facts(material, group, run, own, peak),
+        "frequency": rounded(own.frequency, 6),
+        "tolerance": None if tolerance is None else rounded(tolerance, 3),
+        "speed": rounded(own.speed / RPM, 5),
+        "peak": rounded(own.line.order * own.speed / (2.0 * math.pi), 6),
+        "line": line,
+        "short": material.words.line(own.line),
+        "level": rounded(own.level, 4),
+        "steady": is_found_always(own),
+        "inside": own.inside,
+        "mode": own.mode,
+        "facts": [*_amplitudes(material, own), *_facts(material, group, own), *_mode_facts(material, group, run, own)],
+        "caveats": [material.words.labelled(text) for text in own.caveats],
     }
 
 
-def _facts(
-    material: ReportData, group: RunGroup, run: VariantRun, resonance: RankedResonance, peak: Pick
-) -> list[list[str]]:
-    """Return headings and text on a peak of a resonance for the panel next to the waterfall."""
+def _amplitudes(material: ReportData, own: ListedResonance) -> list[list[str]]:
+    """Return the amplitudes of a resonance as headings and text, for the panel next to the waterfall."""
+    if own.resonance is None:
+        return []
+    facts = []
+    for name, amplitude in own.resonance.amplitudes.items():
+        label = QUANTITIES[name]
+        text = f"±{rounded_text(label.factor * amplitude.amplitude)} {label.unit}"
+        if amplitude.limits is not None:
+            ends = [rounded_text(label.factor * limit.amplitude) for limit in reversed(amplitude.limits)]
+            text += f" ({' to '.join(ends)} with damping)"
+        text += f", {material.words.of(amplitude.at)}" if amplitude.at else ""
+        text += f", rank {amplitude.place}" if amplitude.place else ""
+        facts.append([label.title, text])
+    return facts
+
+
+def _facts(material: ReportData, group: RunGroup, own: ListedResonance) -> list[list[str]]:
+    """Return what excites a resonance, what a run-up shows of it, and how high other variants are there."""
     words = material.words
-    others = list(dict.fromkeys(p.line for p in resonance.finding.resonance.picks if p.line != peak.line))[:ALSO]
-    at = resonance.constant if peak is resonance.peak else None
-    at_constant = "" if at is None else f"; at constant speed {figure_text(at.level)} dB at {at.frequency:.1f} Hz"
-    facts = [
-        [
-            "Level",
-            f"{figure_text(peak.level)} dB = ±{figure_text(10.0 ** (peak.level / 20.0), 2)} µm zero-to-peak, "
-            f"prominence {figure_text(peak.prominence, 2)} dB{at_constant}",
-        ],
-        ["Excited by", f"{words.line_sentence(peak.line)} (order {figure_text(peak.line.order, 4)})"],
-    ]
-    if others:
-        facts.append(["Shown by", ", ".join(words.line(line) for line in others)])
-    for variant, level in resonance.elsewhere.items():
-        lacks = "not resolved, " if variant in resonance.lacking else ""
-        there = f"{figure_text(level)} dB there" if math.isfinite(level) else "outside its range"
+    facts = [["Excited by", f"{words.line_sentence(own.line)} (order {figure_text(own.line.order, 4)})"]]
+    found = own.peak
+    if found is None:
+        return facts
+    if not group.responses:
+        peak = group.shown_peak(found)
+        at = found.constant if peak is found.peak else None
+        at_constant = "" if at is None else f"; at constant speed {figure_text(at.level)} dB at {at.frequency:.1f} Hz"
+        amplitude = figure_text(10.0 ** (peak.level / 20.0), 2)
+        level = f"{figure_text(peak.level)} dB = ±{amplitude} µm zero-to-peak, prominence "
+        facts.insert(0, ["Level", f"{level}{figure_text(peak.prominence, 2)} dB{at_constant}"])
+        picks = (pick.line for pick in found.finding.resonance.picks if pick.line != peak.line)
+        if others := list(dict.fromkeys(picks))[:ALSO]:
+            facts.append(["Shown by", ", ".join(words.line(line) for line in others)])
+    for variant, level_there in found.elsewhere.items():
+        lacks = "not resolved, " if variant in found.lacking else ""
+        there = f"TE {figure_text(level_there)} dB there" if math.isfinite(level_there) else "outside its range"
         facts.append([Variant.of(variant).label.capitalize(), f"{lacks}{there}"])
-    facts += _mode_facts(material, group, run, resonance)
-    if not resonance.steady:
+    if not found.steady:
         facts.append(["Warning", "not found with all window lengths; possibly not a resonance"])
     return facts
 
 
-def _mode_facts(material: ReportData, group: RunGroup, run: VariantRun, resonance: RankedResonance) -> list[list[str]]:
-    mode = resonance.finding.mode
+def _mode_facts(material: ReportData, group: RunGroup, run: VariantRun, own: ListedResonance) -> list[list[str]]:
     modes = run.modes
-    if resonance.finding.mode_name and modes is None:
-        moves = material.words.labelled(resonance.finding.mode_name)
-        return [["Mode", f"{resonance.finding.mode_frequency:.1f} Hz at this speed"], ["Mode shape", moves]]
-    if modes is None and not group.responses:
-        return [["Mode", "no modes computed; run exugear modes"]]
-    if mode is None or modes is None:
+    if modes is None:
+        name = own.peak.finding.mode_name if own.peak is not None else ""
+        text = material.words.labelled(name) or ("none near" if group.responses else "none computed; run exugear modes")
+        return [["Mode", text]]
+    if own.mode is None:
         return [["Mode", "none near"]]
-    damping = 100.0 * float(modes["damping_ratio"][mode])
+    damping = 100.0 * float(modes["damping_ratio"][own.mode])
+    frequency = float(modes["frequency"][own.mode])
     return [
-        ["Mode", f"{resonance.finding.mode_frequency:.1f} Hz, damping {figure_text(damping, 2)} %"],
-        ["Mode shape", material.words.moves(modes, mode)],
-        ["Strain energy", percentages(material.words.strain_energy(modes, mode))],
+        ["Mode", f"{own.mode + 1} at {frequency:.1f} Hz, damping {figure_text(damping, 2)} %"],
+        ["Mode shape", material.words.moves(modes, own.mode)],
+        ["Strain energy", percentages(material.words.strain_energy(modes, own.mode))],
     ]
+
+
+# Modes with the bodies that move in them
+
+DEFORMED = 32
+"""Number of modes in which flexible bodies deform on the page: those of resonances, and the most visible ones."""
+
+
+def _model(material: ReportData, model: Choice, data: xr.Dataset) -> dict[str, Any]:
+    material.context.tell(f"bodies and modes of {model_label(model)}")
+    assembly = material.context.assembled(model)
+    reports = [report_mode(data, index) for index in range(data.sizes["mode"])]
+    labels = material.words.labels
+    return {
+        "words": model_label(model),
+        "variant": model.variant,
+        "stage": stage_data(
+            assembly, data["shape"].to_numpy(), labels, material.arrays, _deformed(material, model, data)
+        ),
+        "modes": [
+            {
+                "frequency": rounded(report.frequency, 6),
+                "damping": rounded(report.damping_ratio, 4),
+                "words": material.words.moves(data, report.index),
+            }
+            for report in reports
+        ],
+    }
+
+
+def _deformed(material: ReportData, model: Choice, data: xr.Dataset) -> set[int]:
+    if not model.variant.is_elastic:
+        return set()
+    matched = {
+        own.mode
+        for group in material.groups
+        if model.variant in group.runs and group.choice(model.variant) == model
+        for own in material.lists[group.name, model.variant]
+        if own.mode is not None
+    }
+    reports = [report_mode(data, index) for index in range(data.sizes["mode"])]
+    seen = sorted((report for report in reports if report.share >= VISIBLE_SHARE), key=lambda one: -one.amplification)
+    most = [*sorted(matched), *(one.index for one in seen if one.index not in matched)]
+    return set(most[: max(DEFORMED, len(matched))])

@@ -49,6 +49,8 @@ class Cell:
     """Length of a bar next to the text, 0 to 1."""
     kind: str = ""
     """CSS class of the bar: its quantity."""
+    caveat: str = ""
+    """What weakens the number; a sign next to it says so."""
 
     @property
     def order(self) -> str | None:
@@ -86,6 +88,8 @@ class Table:
     """Selection made in the scripts of the page by clicking each row."""
     stacked: bool = False
     """Whether narrow screens show each row as a card."""
+    kinds: Sequence[str] = ()
+    """CSS class of each row, such as ``further`` for rows behind a control."""
 
     @property
     def columns(self) -> dict[str, str]:

@@ -15,7 +15,17 @@ from exugear.gearbox.units import RPM
 from exugear.results.spectra.resonances import Pick
 from exugear.results.spectra.waterfall import OrderLine, Waterfall
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.drawing import COLOURS, axes_or_new, drawable, drawing_style, finish_figure, new_figure
+from fe_ste.tools.drawing import (
+    COLOURS,
+    COLUMN_WIDTHS,
+    axes_or_new,
+    drawable,
+    drawing_style,
+    finish_figure,
+    label_curves,
+    new_figure,
+    order_styles,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -98,13 +108,13 @@ def draw_waterfall(run: Waterfall, lines: Iterable[OrderLine], ax: Axes | None =
 
 def draw_levels(run: Waterfall, lines: Iterable[OrderLine], ax: Axes | None = None) -> Axes:
     """Draw the levels along orders over speed, see `exugear.transient.outcome.Run.plot`."""
-    with axes_or_new(ax, 6.0, 4.0) as panel:
-        for number, line in enumerate(lines):
-            colour = COLOURS[number % len(COLOURS)]
-            panel.plot(run.speed / RPM, run.along(line), color=colour, label=drawable(line.name))
+    lines = list(lines)
+    with axes_or_new(ax, COLUMN_WIDTHS[2], 4.0) as panel:
+        styles = order_styles([line.name for line in lines])
+        for line in lines:
+            panel.plot(run.speed / RPM, run.along(line), label=drawable(line.name), **styles[line.name])
         panel.set(xlabel="Input speed / rpm", ylabel=_level_label(TRANSMISSION_ERROR, run))
-        if lines:
-            panel.legend()
+        label_curves(panel)
         return panel
 
 

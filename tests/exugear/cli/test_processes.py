@@ -305,7 +305,7 @@ def test_what_is_compiled_is_told_before_it_is_and_ctrl_c_ends_it(tmp_path):
         process.send_signal(signal.SIGINT)
         said = process.stderr.read()
     told = " ".join(told.split())
-    assert "of the equations of motion (10 to 25 s per model type); once per installation" in told
+    assert "of the equations of motion (10 to 30 s per model type); once per installation" in told
     assert process.returncode == 130, said
     assert "Stopped" in said
     assert not list((tmp_path / "out").rglob("run*"))

@@ -79,7 +79,7 @@ def test_digits_that_are_given_count() -> None:
     found["gears"]["wheel"]["profile_shift"] = -0.5000001
     found["pairs"]["spur"]["centre_distance_mm"] = 91.5000001
     with pytest.raises(
-        GearboxFileError, match=r"centre_distance = 91\.5000\d* mm is too small.* overlap by 0\.39\d um"
+        GearboxFileError, match=r"centre_distance = 91\.5000\d* mm is too small.* overlap by 0\.39\d µm"
     ):
         Gearbox.from_dict(found, "case.toml")
 

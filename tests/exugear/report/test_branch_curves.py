@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from exugear.report.sections.steady import branch_curves
+from exugear.report.sections.resonances import branch_curves
 
 
 def test_a_branch_with_two_folds_is_drawn_in_parts_that_rise_or_fall_and_meet():

@@ -66,7 +66,8 @@ def test_the_ranking_of_steady_responses_alone_is_that_of_the_largest_amplitudes
         data = load_response(response_path(folder, variant))
         told = [line.order for line in order_lines(gearbox)]
         loudest = next(peak for peak in peaks(data) if np.isclose(told, peak.order).any())
-        first = group["variants"][variant]["resonances"][0]
+        listed = group["variants"][variant]["resonances"]
+        first = max((own for own in listed if own["inside"]), key=lambda own: own["level"])
         # Levels have four digits and speeds five on the page.
         assert first["level"] == pytest.approx(20.0 * np.log10(loudest.amplitude / 1e-6), abs=0.051)
         assert first["speed"] == pytest.approx(loudest.speed * 30.0 / np.pi, rel=1e-4)
@@ -91,7 +92,7 @@ def test_words_say_that_figures_are_of_constant_speed_and_name_the_mode_without_
     ):
         assert words in page, words
     assert "no modes computed; run exugear modes for mode shapes" not in page
-    assert "window-dependent" not in page.partition('id="trust"')[0]
+    assert "window-dependent" not in page.partition('id="assumptions"')[0]
 
 
 def test_the_page_ranks_the_resonances_that_python_ranks(folder):
@@ -107,7 +108,7 @@ def test_the_page_ranks_the_resonances_that_python_ranks(folder):
     }.items():
         shown = [float(value) for value in re.findall(f'data-order="([^"]*)" data-label="{label}"', table)]
         np.testing.assert_allclose(shown, values.head(len(shown)), rtol=1e-8)
-        assert len(shown) == 10
+        assert len(shown) == min(40, len(values)) > 10
 
 
 @pytest.mark.validation
@@ -120,7 +121,10 @@ def test_with_run_ups_beside_them_both_sources_can_be_chosen(folder, tmp_path):
     report = write_report(both)
     groups = data_of(report.path)["groups"]
     assert [group["source"] for group in groups] == ["constant speed, time-varying stiffness", "run-up run_up"]
-    assert 'id="group"' in report.path.read_text(encoding="utf-8")
+    assert [group["words"] for group in groups] == [
+        "Constant speed, time-varying stiffness, static load",
+        "Run-up run_up",
+    ]
     # The command line leads with constant speed; the run-up follows under its own name.
     assert len([line for line in report.statements if line.startswith("Highest resonance")]) == 1
     assert (
@@ -174,7 +178,7 @@ class TestInABrowser:
         view.page.locator("#bearings .choice:visible").first.click()
         title = view.page.locator("#waterfall figcaption strong")
         assert view.soon(lambda: title.inner_text().startswith("Force: "))
-        view.page.locator("#view button", has_text="Difference").click()
+        view.page.locator("#difference").check()
         assert view.soon(lambda: "on bearings against on ideal joints" in title.inner_text())
         view.page.context.close()
         assert view.errors == []

@@ -17,6 +17,7 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.report.findings.resonance_list import MOST_INSIDE
 from exugear.report.writer import write_report
 from exugear.results.folder import keep_case, modes_path
 from exugear.steady.settings import SpeedRange, SteadySettings
@@ -29,7 +30,10 @@ from .page_view import IN_BROWSER, View, opened
 
 CHOICE = Choice("bushing", "line_of_action", "assemblies")
 SETTINGS = SteadySettings(SpeedRange.from_text("-10:-35:60"), harmonics=4)
-MOST_PAGES = 8
+MOST_PAGES = 4
+OPERATION = (11.05, 27.625)
+"""Operating range of the GRC, rpm."""
+PARTS = ["Answer", "Resonances", "Changes", "Bearings and life", "Gears", "Model and checks"]
 
 
 @pytest.fixture(scope="module")
@@ -107,11 +111,17 @@ def test_all_numbers_of_the_page_are_those_of_one_list(folder, told):
     first = listed[0]
     # The ranking has the list, and the headline is its first row.
     rows = rows_of(page, "resonances")
-    for row, own in zip(rows, listed, strict=False):
+    for row, own in zip(rows[:MOST_INSIDE], listed, strict=False):
         assert float(row["speed / rpm"]) == pytest.approx(abs(own["speed_rpm"]), rel=5e-3)
         assert float(row["frequency / Hz"]) == pytest.approx(own["frequency_Hz"], rel=5e-3)
         for (key, factor), label in zip(FACTORS.items(), COLUMNS.values(), strict=True):
             assert float(row[label]) == pytest.approx(factor * own[key], rel=5e-3, abs=1e-9)
+    # Below are resonances at other speeds, without ranks.
+    beyond = rows[min(MOST_INSIDE, len(listed)) :]
+    assert beyond
+    for row in beyond:
+        assert not OPERATION[0] <= float(row["speed / rpm"]) <= OPERATION[1]
+        assert row["rank, error"] == row["rank, acceleration"] == "–"
     large = re.findall(r'<p class="large">(.*?)</p>', page)[0]
     frequency, speed = re.findall(r"<strong>([\d.]+) (?:Hz|rpm)", large)
     assert (frequency, speed) == (rows[0]["frequency / Hz"], rows[0]["speed / rpm"])
@@ -139,22 +149,23 @@ def test_all_numbers_of_the_page_are_those_of_one_list(folder, told):
     # "Damping does not change the first rank" is said only if the ranks over the range of damping say so.
     stays = any("Damping does not change the first rank" in text for text in told["statements"])
     assert stays == (first["force_places_over_damping"] == [1, 1])
-    # Each row of "Resonances by model" has the speed and the level of the panel that opens from it.
+    # Each row of the list has the speed, the frequency and the order of the panel that opens from it.
     data = json.loads(re.search(r'id="data">(.*?)</script>', page, re.DOTALL)[1])
     compared = 0
     for group in data["groups"]:
         for name, variant in group["variants"].items():
-            (table,) = re.findall(rf'<table id="ranking-{group["name"]}-{name}".*?</table>', page, re.DOTALL)
-            head = re.findall(r"<th[^>]*>(.*?)</th>", table)
-            rows = re.findall(r"<tr data-choice.*?</tr>", table, re.DOTALL)
-            for row, panel in zip(rows, variant["resonances"], strict=True):
-                values = [re.sub(r"<[^>]*>", "", cell) for cell in re.findall(r"<td.*?>(.*?)</td>", row, re.DOTALL)]
-                shown = dict(zip(head, values, strict=True))
-                assert float(shown["Speed / rpm"]) == pytest.approx(panel["speed"], rel=1e-3)
-                assert float(shown["Level / dB"]) == pytest.approx(panel["level"], abs=0.06)
-                assert shown["Excited by"] == data["lines"][panel["line"]]["short"]
+            leads = group is data["groups"][0] and name == group["main"]
+            table = "resonances" if leads else f"resonances-{group['name']}-{name}"
+            for row, panel in zip(rows_of(page, table), variant["resonances"], strict=True):
+                assert float(row["speed / rpm"]) == pytest.approx(panel["speed"], rel=5e-3)
+                assert float(row["frequency / Hz"]) == pytest.approx(panel["frequency"], rel=5e-3)
+                error = 1e-6 * float(row[COLUMNS["error"]])
+                assert 20.0 * np.log10(error / 1e-6) == pytest.approx(panel["level"], abs=0.06)
+                assert row["excited by"] == panel["short"]
+                facts = dict(panel["facts"])
+                assert facts["Bearing force"].startswith(f"±{row[COLUMNS['force']]} kN")
                 compared += 1
-    assert compared > 5
+    assert compared > 10
 
 
 class TestInABrowser:
@@ -162,7 +173,7 @@ class TestInABrowser:
 
     def test_headline_first_row_and_json_agree(self, view: View, told: dict[str, Any]) -> None:
         first = told["resonances"][0]
-        large = view.page.locator("#short .headline .large").inner_text()
+        large = view.page.locator("#answer .headline .large").inner_text()
         frequency, speed = (float(text) for text in re.findall(r"([\d.]+) (?:Hz|rpm)", large))
         assert frequency == pytest.approx(first["frequency_Hz"], rel=5e-3)
         assert speed == pytest.approx(abs(first["speed_rpm"]), rel=5e-3)
@@ -179,23 +190,60 @@ class TestInABrowser:
 
     def test_the_first_screen_is_seen_without_scrolling(self, view: View) -> None:
         view.page.set_viewport_size({"width": 1440, "height": 900})
-        boxes = [box.bounding_box() for box in view.page.locator("#short .chain").all()]
+        boxes = [box.bounding_box() for box in view.page.locator("#answer .chain").all()]
         assert len(boxes) == 3
         assert max(box["y"] + box["height"] for box in boxes) <= 900
-        assert view.page.locator("#short svg.drawing:visible").count() == 1
-        assert view.page.locator("#short img.mode-picture").count() == 1
-        sentences = view.page.locator("#short .card > p, #short .about p, #short .further p").all_inner_texts()
+        assert view.page.locator("#answer svg.drawing:visible").count() == 1
+        assert view.page.locator("#answer img.mode-picture").count() == 1
+        sentences = view.page.locator("#answer .card > p, #answer .about p, #answer .further p").all_inner_texts()
         assert max(len(text.split()) for text in sentences) <= 25
 
+    def test_the_page_has_six_parts_and_large_controls(self, view: View) -> None:
+        assert view.page.locator("nav a").all_inner_texts() == PARTS
+        assert view.page.evaluate("(n => n.scrollWidth - n.clientWidth)(document.querySelector('nav'))") <= 0
+        small = """() => [...document.querySelectorAll('button, select, input, summary, nav a')].filter(e =>
+            e.offsetParent && e.getBoundingClientRect().height < 24).map(e => e.outerHTML)"""
+        assert view.page.evaluate(small) == []
+
+    def test_a_circle_selects_its_resonance_everywhere_and_the_cursor_is_shared(self, view: View) -> None:
+        circle = view.page.locator("#answer svg.wide-only g.ranked:has-text('4')").first
+        circle.click()
+        assert "No. 4 of " in view.page.locator("#detail").inner_text()
+        assert view.page.locator("#resonances tr.chosen td").first.inner_text() == "4"
+        assert view.page.locator(".campbell-figure svg.wide-only g.chosen").text_content().strip() == "4"
+        drawing = view.page.locator("#answer svg.wide-only")
+        drawing.hover()
+        readout = view.page.locator("#speed-readout")
+        assert view.soon(lambda: re.match(r"[\d.]+ rpm: .*force ±", readout.inner_text()))
+        assert view.page.locator("svg.wide-only .cursor[visibility=visible]").count() == 2
+        view.page.locator("#resonances tbody tr").first.click()
+
+    def test_diagrams_begin_at_the_operating_range(self, view: View) -> None:
+        assert view.page.locator("#extent").input_value() == "first"
+        data = json.loads(view.page.locator("#data").text_content())
+        (group,) = data["groups"]
+        listed = group["variants"]["bushing"]["resonances"]
+        rows = view.page.locator("#resonances tbody tr:visible")
+        assert rows.count() == 10
+        view.page.locator("#extent").select_option("range")
+        assert rows.count() == sum(own["inside"] for own in listed) < len(listed)
+        view.page.locator("#extent").select_option("all")
+        assert rows.count() == len(listed)
+        view.page.locator("#extent").select_option("first")
+        assert group["range"] == pytest.approx(OPERATION)
+        speeds, columns = group["variants"]["bushing"]["channels"][0]["knots"]
+        inside = np.diff(np.interp([0.8 * OPERATION[0], 1.15 * OPERATION[1]], speeds, columns))[0]
+        assert inside >= 0.5 * columns[-1]
+
     def test_circles_are_those_of_the_ranking(self, view: View) -> None:
-        circles = view.page.locator("#campbell svg.wide-only .ranked text").all_text_contents()
-        rows = view.page.locator("#resonances tbody tr").count()
+        circles = view.page.locator("#ranking .campbell-figure svg.wide-only .ranked text").all_text_contents()
+        rows = view.page.locator("#resonances tbody tr:visible").count()
         assert sorted(map(int, circles)) == list(range(1, rows + 1))
-        assert view.page.locator("#campbell svg.wide-only .rated").count() == 1
+        assert view.page.locator("#ranking .campbell-figure svg.wide-only .rated").count() == 1
 
     def test_data_files_have_plain_numbers(self, view: View) -> None:
         with view.page.expect_download() as got:
-            view.page.locator("#ranking .of-table button").click()
+            view.page.locator("#ranking .listed .of-table button:visible").click()
         text = Path(got.value.path()).read_text(encoding="utf-8-sig")
         head, *rows = csv.reader(io.StringIO(text))
         texts = {"excited by", "place", "mode shape"}
@@ -207,8 +255,8 @@ class TestInABrowser:
         view.page.set_viewport_size({"width": 390, "height": 844})
         view.open(folder / "report.html")
         assert view.page.evaluate("document.documentElement.scrollWidth") <= 390
-        assert view.page.locator("#short svg.drawing:visible").count() == 1
-        inside = "[...document.querySelectorAll('#short *, #resonances *')].map(e => e.getBoundingClientRect().right)"
+        assert view.page.locator("#answer svg.drawing:visible").count() == 1
+        inside = "[...document.querySelectorAll('#answer *, #resonances *')].map(e => e.getBoundingClientRect().right)"
         assert max(view.page.evaluate(inside)) <= 390.5
         view.page.set_viewport_size({"width": 1440, "height": 900})
         view.open(folder / "report.html")
@@ -219,9 +267,10 @@ class TestInABrowser:
         assert 2 <= pages <= MOST_PAGES
         view.page.emulate_media(media="print")
         view.page.set_viewport_size({"width": 711, "height": 1039})  # A4 without its margins
-        first = view.page.locator("#short").bounding_box()
+        first = view.page.locator("#answer").bounding_box()
         assert first["y"] + first["height"] <= 1039
-        assert not view.page.locator("#rings, #modes, #inputs").locator("visible=true").count()
+        assert not view.page.locator("#waterfall, #view-3d, #inputs").locator("visible=true").count()
+        assert view.page.locator("#resonances tbody tr:visible").count() == 10
         assert view.page.locator(".paper-only").is_visible()
         view.page.emulate_media(media="screen")
         view.page.set_viewport_size({"width": 1440, "height": 900})
@@ -230,9 +279,9 @@ class TestInABrowser:
     def test_without_scripts_text_and_drawings_are_there(self, browser: Any, folder: Path, view: View) -> None:
         plain = opened(browser, "desk", java_script_enabled=False)
         plain.page.goto((folder / "report.html").as_uri())
-        assert plain.page.locator("#short svg.drawing:visible").count() == 1
-        assert "Hz" in plain.page.locator("#short .headline").inner_text()
-        assert plain.page.locator("#campbell svg:visible").count() == 1
+        assert plain.page.locator("#answer svg.drawing:visible").count() == 1
+        assert "Hz" in plain.page.locator("#answer .headline").inner_text()
+        assert plain.page.locator("#ranking .campbell-figure svg:visible").count() == 1
         assert plain.page.locator("#resonances tbody tr:visible").count() >= 5
         assert plain.errors == []
         plain.page.context.close()

@@ -152,23 +152,27 @@ def test_no_name_breaks_out_of_a_page(results: tuple[Path, list[Any]], name: str
     assert not re.search("[<>&]", found.texts["data"])
 
 
+EMPTY_LIST: dict[str, Any] = {"listed": [], "animated": False, "modes": [], "responses": []}
+NO_GEARS = {"errors": Table([]), "gears": Table([])}
+
+
 def test_pieces_of_a_page_escape_whatever_a_file_holds() -> None:
     table = Table(
         [{HTML: Cell(HTML, choice=HTML, tag="good")}, {HTML: HTML}], caption=HTML, name=HTML, choices=[HTML] * 2
     )
     waterfall = Figure("waterfall", HTML, HTML, HTML)
+    pair = {"title": HTML, "maps": [], "words": HTML, "data_sheet": table}
     pieces = [
         render("table", table=table),
-        render("waterfall", words=HTML, waterfall=waterfall, cuts=waterfall, modes=False),
+        render("resonances", **EMPTY_LIST | {"words": HTML, "waterfall": waterfall, "cuts": waterfall}),
         render("mode_page", heading=HTML, modes=table, operation=table, about_resonances=HTML),
-        render("studies", studies=[{"title": HTML, "words": HTML, "fits": True, "pictures": [(HTML, HTML)]}]),
+        render("gears", **NO_GEARS | {"contacts": table, "scope": HTML, "pairs": [pair]}),
     ]
     found = Page("".join(pieces))
     assert not [own for own in found.active if "onerror" in own.split("=")[0]]
-    assert [dict(attributes).get("src") for tag, attributes in found.elements if tag == "img"][-1] == HTML
     assert not [tag for tag, _ in found.elements if tag == "script"]
-    assert found.texts["h1"] == found.texts["h3"] == HTML
-    assert found.texts["td"] == 3 * HTML
+    assert found.texts["h1"] == HTML and found.texts["h4"] == HTML
+    assert found.texts["td"] == 5 * HTML
 
 
 def test_pictures_take_any_name_and_a_formula_in_it_as_text(tmp_path: Path) -> None:

@@ -36,7 +36,7 @@ def test_a_report_knows_a_life_whose_stresses_come_from_tables_of_its_own(projec
     skewed.life(counted=counted)
     report = write_report(skewed.folder)
     assert not [line for line in report.left_out if "life.nc" in line]
-    assert '<section id="life"' in report.path.read_text(encoding="utf-8")
+    assert '<div class="life"' in report.path.read_text(encoding="utf-8")
 
 
 @pytest.mark.validation
@@ -44,7 +44,7 @@ def test_a_report_tells_what_limits_the_life_and_leaves_out_what_does_not_fit(pr
     project.life()
     report = write_report(project.folder)
     page = report.path.read_text(encoding="utf-8")
-    section = page[page.index('<section id="life"') :]
+    section = page[page.index('<div class="life"') :]
     assert "pinion + spur" in section and "S_H" in section and "data:image/png;base64," in section
     assert "% of the load is outside the path of contact" in section and "K_Hbeta" in section
     assert "bearing 1: defined by its stiffness only; add a" in section
@@ -53,4 +53,4 @@ def test_a_report_tells_what_limits_the_life_and_leaves_out_what_does_not_fit(pr
     Project(other, project.folder, project.choice).keep_case()
     again = write_report(project.folder)
     assert any("life.nc: was computed from another input" in line for line in again.left_out)
-    assert '<section id="life"' not in again.path.read_text(encoding="utf-8")
+    assert '<div class="life"' not in again.path.read_text(encoding="utf-8")

@@ -137,10 +137,25 @@ def operation(tmp_path_factory: pytest.TempPathFactory, coarse_tables: None) -> 
     assert "exugear steady " in page.read_text(encoding="utf-8")
     steady = exugear("steady", *options)
     assert steady.exit_code == 0, steady.stderr
+    usual = exugear("view", *options)
+    assert usual.exit_code == 0, usual.stderr
+    assert json.loads(usual.stdout)["resonance"] == 1
     shown = exugear("view", *options, "--resonance", 2)
     assert shown.exit_code == 0, shown.stderr
     assert json.loads(shown.stdout)["resonance"] == 2
     return page, json.loads(steady.stdout)
+
+
+def test_a_phone_shows_the_first_resonance_with_its_picture_in_view(
+    browser: Any, operation: tuple[Path, dict[str, Any]]
+) -> None:
+    view = opened(browser, "phone")
+    view.open(operation[0])
+    assert view.page.evaluate("window.scrollY") == 0
+    assert view.page.locator("#mode-title").is_visible()
+    box = view.page.locator("#view-3d").bounding_box()
+    assert box["y"] + box["height"] <= SIZES["phone"][1]
+    view.page.context.close()
 
 
 def test_resonances_are_those_of_the_command_line(browser: Any, operation: tuple[Path, dict[str, Any]]) -> None:

@@ -6,6 +6,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from exugear.gearbox.choice import Choice
+from exugear.gearbox.load_cases import operating_range
 from exugear.gearbox.units import RPM
 from exugear.results.spectra.run_spectra import mobility_shares, report_mode
 from exugear.results.spectra.waterfall import order_lines
@@ -28,12 +29,15 @@ def test_campbell_has_the_visible_modes_and_their_crossings_with_the_mesh_orders
     assert (panel.get_xlabel(), panel.get_ylabel()) == ("Input speed / rpm", "Frequency / kHz")
     data = modes.to_dataset()
     seen = [report_mode(data, n) for n in np.flatnonzero(mobility_shares(data) >= VISIBLE)]
-    frequencies = [1e-3 * mode.frequency for mode in seen if mode.frequency > 0.0]
+    top = panel.get_ylim()[1]
+    frequencies = [1e-3 * mode.frequency for mode in seen if 0.0 < mode.frequency <= 1e3 * top]
     lines = order_lines(grc)
     levels = panel.lines[: -len(lines)]
     np.testing.assert_array_equal([line.get_ydata()[0] for line in levels], frequencies)
     assert [line.get_label() for line in panel.lines[-len(lines) :]] == [line.name for line in lines]
     fastest = panel.get_xlim()[1]
+    assert fastest == pytest.approx(operating_range(grc)[1] / RPM)
+    assert top <= 1.0501e-3 * max(line.frequency(fastest * RPM) for line in lines)
     for line, marks in zip(lines, panel.collections, strict=True):
         speed, frequency = np.asarray(marks.get_offsets()).T
         np.testing.assert_allclose(1e-3 * line.frequency(speed * RPM), frequency)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import math
 import os
 import shutil
 import subprocess
@@ -80,6 +81,41 @@ def test_compiled_functions_read_only_what_the_digest_covers() -> None:
     others = {name for name, text in sources.items() if "fe_ste.tools.compilation" not in text}
     frozen = {name: list(foreign_names(text, others)) for name, text in with_kernels.items()}
     assert {name: names for name, names in frozen.items() if names} == {}
+
+
+@pytest.fixture
+def read_only(tmp_path: Path) -> Path:
+    """A copy of the package in which no folder can be made beside the sources, by an administrator either."""
+    shutil.copytree(ROOT / "fe_ste", tmp_path / "fe_ste", ignore=shutil.ignore_patterns("__pycache__"))
+    (tmp_path / "fe_ste" / "tools" / "__pycache__").write_bytes(b"")
+    return tmp_path
+
+
+@pytest.mark.validation
+def test_a_package_that_cannot_be_written_keeps_its_kernels_with_the_user(read_only: Path, tmp_path: Path) -> None:
+    cache = tmp_path / "cache"
+    folder, said = printed("fe_ste.tools.compilation.kernel_folder()", read_only, XDG_CACHE_HOME=str(cache))
+    assert Path(folder).is_relative_to(cache / "exugear")
+    assert said == ""
+
+
+@pytest.mark.validation
+def test_without_a_place_for_kernels_they_are_compiled_with_a_warning(read_only: Path) -> None:
+    expression = "fe_ste.elasticity.halfspace.rectangle_integral(0.0, 0.0, 1.0, 1.0)"
+    number, said = printed(expression, read_only, HOME=os.devnull)
+    assert float(number) == pytest.approx(8.0 * math.log(1.0 + math.sqrt(2.0)), rel=1e-12)
+    assert said.count("No folder for compiled kernels can be written") == 1
+
+
+def test_no_machine_code_is_read_from_where_another_user_could_put_it(tmp_path: Path) -> None:
+    """What lies in a cache is executed."""
+    trap = tmp_path / "open"
+    trap.mkdir()
+    trap.chmod(0o777)
+    folder, said = printed("fe_ste.tools.compilation.kernel_folder()", NUMBA_CACHE_DIR=str(trap / "cache"))
+    assert folder == "None"
+    assert "No folder for compiled kernels can be written" in said
+    assert not list(trap.iterdir())
 
 
 def test_only_the_folder_in_use_and_few_older_ones_stay(tmp_path: Path) -> None:

@@ -2,17 +2,18 @@
 import { curveColour, pageColour } from "./colours.js";
 import { make, need } from "./dom.js";
 import { addTools } from "./downloads.js";
-import { dashOf, lineColour, toggleLine } from "./order_lines.js";
+import { clipped, dashOf, lineColour, toggleLine } from "./order_lines.js";
 import { pageData, unpack } from "./page_data.js";
 import { axisOf, drawPlot, zoomButtons } from "./plots.js";
-import { chosenGroup, chosenResonance, state } from "./state.js";
+import { showSpeed } from "./speed_cursor.js";
+import { allSpeeds, chosenGroup, chosenResonance, firstSpeeds, state } from "./state.js";
 
 const NO_LEVEL = -32768;
 /** dB below the highest level at which the diagram ends. */
 const DEPTH = 70;
 let asked = 0;
 
-/** @typedef {{label: string, line: number, main: boolean, constant: boolean, speeds: number[], levels: (number | null)[]}} Cut */
+/** @typedef {{kind: string, label: string, line: number, main: boolean, constant: boolean, speeds: number[], levels: (number | null)[]}} Cut */
 /** @typedef {{cuts: ArrayReference, speeds: ArrayReference}} Source */
 /** @typedef {import("./page_data.js").ArrayReference} ArrayReference */
 
@@ -44,15 +45,18 @@ export async function drawCuts() {
  * Cuts of the chosen orders from what holds levels of all.
  * @param {Source} source @param {{words: string, main: boolean, constant: boolean}} kind @returns {Promise<Cut[]>}
  */
-async function cutsOf(source, { words, main, constant }) {
+async function cutsOf(source, kind) {
+  const { words, main, constant } = kind;
   const speeds = Array.from(await unpack(source.speeds));
   const levels = await unpack(source.cuts);
-  return state.lines.map((line) => {
+  // Of the other variants only the order of the resonance, or else the first.
+  const lines = kind.main ? state.lines : [chosenResonance()?.line ?? -1].filter((line) => state.lines.includes(line));
+  return (lines.length ? lines : state.lines.slice(0, 1)).map((line) => {
     const along = speeds.map((_, frame) => {
       const level = levels[frame * pageData.lines.length + line];
       return level === NO_LEVEL ? null : level / 10;
     });
-    return { label: `${pageData.lines[line].short}, ${words}`, line, main, constant, speeds, levels: along };
+    return { kind: words, label: `${pageData.lines[line].short}, ${words}`, line, main, constant, speeds, levels: along };
   });
 }
 
@@ -68,11 +72,16 @@ function dashesOf(cut, single) {
 
 /** @param {Cut[]} cuts */
 function draw(cuts) {
-  const known = cuts.flatMap((cut) => cut.levels.filter((level) => level !== null));
+  const group = chosenGroup();
+  if (!group) return;
+  const speeds = firstSpeeds(group);
+  const inside = (/** @type {Cut} */ cut) =>
+    cut.levels.filter((level, place) => level !== null && cut.speeds[place] >= speeds[0] && cut.speeds[place] <= speeds[1]);
+  const known = /** @type {number[]} */ (cuts.flatMap(inside));
   const highest = known.length ? Math.max(...known) : 0;
   const lowest = known.length ? Math.max(Math.min(...known), highest - DEPTH) : -1;
   /** @type {import("./plots.js").Bounds} */
-  const bounds = { x: [0, state.limit], y: [lowest - 3, highest + 5] };
+  const bounds = { x: [0, allSpeeds(group)[1]], y: [lowest - 3, highest + 5] };
   const unit = state.channel === "overall" ? "µm" : "N";
   const single = state.lines.length === 1;
   const tables = cuts.map((cut) => /** @type {PlotData} */ ([cut.speeds, cut.levels]));
@@ -96,13 +105,18 @@ function draw(cuts) {
           points: { show: false },
         })),
       ],
-      hooks: { draw: [paintMarks] },
+      hooks: {
+        draw: [(plot) => paintLabels(plot, cuts), paintMarks],
+        setCursor: [(plot) => void ((plot.cursor.left ?? -1) >= 0 && showSpeed(plot.posToVal(plot.cursor.left ?? 0, "x")))],
+      },
     },
     joined,
     bounds,
+    { x: speeds, y: bounds.y },
   );
   const caption = need("cuts").querySelector(".hint");
-  if (caption) caption.textContent = cuts.map((cut) => `${styleOf(cut)}: ${cut.label}`).join(". ");
+  const kinds = new Set(cuts.map((cut) => `${styleOf(cut)}: ${cut.kind}`));
+  if (caption) caption.textContent = [...kinds].join(". ");
   addTools(need("cuts").querySelector(".tools"), () => "Order cuts", {
     rows: () => cutRows(cuts, joined),
     canvas: () => /** @type {HTMLCanvasElement} */ (box().querySelector("canvas")),
@@ -114,6 +128,38 @@ function draw(cuts) {
 function cutRows(cuts, joined) {
   const head = [`${pageData.input} speed / rpm`, ...cuts.map((cut) => `${cut.label} / dB`)];
   return [head, ...Array.from(joined[0], (_, row) => joined.map((column) => column[row]))];
+}
+
+/** The name of each curve at its highest visible point. @param {Plot} plot @param {Cut[]} cuts */
+function paintLabels(plot, cuts) {
+  const { min = 0, max = 1 } = plot.scales.x;
+  /** @type {[number, number, number][]} */
+  const taken = [];
+  clipped(plot, (drawing, ratio) => {
+    drawing.font = `600 ${11 * ratio}px system-ui, sans-serif`;
+    drawing.lineWidth = 3 * ratio;
+    drawing.strokeStyle = pageColour("--panel");
+    for (const cut of cuts.filter((own) => own.main && !own.constant)) {
+      let best = -1;
+      cut.levels.forEach((level, place) => {
+        const seen = level !== null && cut.speeds[place] >= (min ?? 0) && cut.speeds[place] <= (max ?? 1);
+        if (seen && (best < 0 || level > (cut.levels[best] ?? -Infinity))) best = place;
+      });
+      if (best < 0) continue;
+      const words = pageData.lines[cut.line].short;
+      const x = plot.valToPos(cut.speeds[best], "x", true);
+      let y = plot.valToPos(cut.levels[best] ?? 0, "y", true) - 5 * ratio;
+      const size = drawing.measureText(words).width;
+      const left = Math.min(Math.max(x - size / 2, plot.bbox.left + 4), plot.bbox.left + plot.bbox.width - size - 4);
+      y = Math.max(y, plot.bbox.top + 12 * ratio);
+      while (taken.some(([a, b, w]) => left < a + w + 8 && a < left + size + 8 && Math.abs(b - y) < 13 * ratio)) y += 13 * ratio;
+      taken.push([left, y, size]);
+      drawing.fillStyle = state.lines.length === 1 ? curveColour(0) : lineColour(cut.line);
+      drawing.textAlign = "left";
+      drawing.strokeText(words, left, y);
+      drawing.fillText(words, left, y);
+    }
+  });
 }
 
 /** Rated speed and the chosen resonance. @param {Plot} plot */

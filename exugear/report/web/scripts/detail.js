@@ -19,12 +19,14 @@ export function drawDetail() {
     make("button", { type: "button", "aria-label": "Previous resonance", click: () => move(-1) }, "‹"),
     make("button", { type: "button", "aria-label": "Next resonance", click: () => move(1) }, "›"),
   );
-  const where = `± ${figureText(own.tolerance)} Hz at ${figureText(own.speed, 4)} rpm`;
+  const where = `${own.tolerance === null ? "" : `± ${figureText(own.tolerance)} Hz `}at ${figureText(own.speed, 4)} rpm`;
   const rank = make("span", { class: "tag plain" }, `No. ${state.resonance + 1} of ${variant.resonances.length}`);
+  const outside = own.inside ? [] : [make("span", { class: "tag mind" }, "outside the operating range")];
   const heading = make("h3", {}, `${figureText(own.frequency, 4)} Hz `, make("small", {}, where));
   const facts = make("dl", { class: "facts" });
   for (const [term, words] of own.facts) facts.append(make("dt", {}, term), make("dd", {}, words));
-  place.replaceChildren(step, heading, make("p", {}, rank, ` ${variant.words}`), facts);
+  const caveats = own.caveats.map((words) => make("p", { class: "caveat-words" }, make("span", { class: "caveat" }), ` ${words}`));
+  place.replaceChildren(step, heading, make("p", {}, rank, ...outside, ` ${variant.words}`), ...caveats, facts);
 }
 
 function modeWords() {

@@ -26,17 +26,24 @@ export function levelAt(field, column, row) {
 }
 
 /** @param {Field} field @param {number} speed rpm @returns {number} */
-export const columnOf = (field, speed) => {
-  const [low, high] = field.channel.span;
-  return Math.floor(((speed - low) / Math.max(high - low, 1e-9)) * field.columns);
-};
+export const columnOf = (field, speed) => Math.floor(along(...field.channel.knots, speed));
 
 /** @param {Field} field @param {number} frequency Hz @returns {number} */
 export const rowOf = (field, frequency) => Math.round((frequency - field.channel.first) / field.channel.spacing);
 
 /** @param {Field} field @param {number} column @returns {number} speed in the middle of a column, rpm */
-export const speedOf = (field, column) =>
-  field.channel.span[0] + ((column + 0.5) / field.columns) * (field.channel.span[1] - field.channel.span[0]);
+export const speedOf = (field, column) => along(field.channel.knots[1], field.channel.knots[0], column + 0.5);
+
+/**
+ * Value of a line through knots, straight on beyond its ends.
+ * @param {number[]} from @param {number[]} to @param {number} value @returns {number}
+ */
+function along(from, to, value) {
+  let piece = 0;
+  while (piece < from.length - 2 && value > from[piece + 1]) piece++;
+  const share = (value - from[piece]) / Math.max(from[piece + 1] - from[piece], 1e-9);
+  return to[piece] + share * (to[piece + 1] - to[piece]);
+}
 
 /** @param {Field} field @param {number} row @returns {number} frequency of a row, Hz */
 export const frequencyOf = (field, row) => field.channel.first + row * field.channel.spacing;

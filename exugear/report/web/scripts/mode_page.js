@@ -6,6 +6,15 @@ import { choose, onChange, state } from "./state.js";
 import { beginTables } from "./tables.js";
 import { beginTheme } from "./theme.js";
 
+/** Scroll a row into view within its list, and never the page: the picture stays in view. @param {HTMLElement | null} row */
+function showRow(row) {
+  const list = row?.closest(".scroll");
+  if (!row || !list) return;
+  const [inner, outer] = [row.getBoundingClientRect(), list.getBoundingClientRect()];
+  if (inner.bottom > outer.bottom) list.scrollTop += inner.bottom - outer.bottom;
+  if (inner.top < outer.top) list.scrollTop += inner.top - outer.top;
+}
+
 /** Mark the mode that is shown. */
 function markMode() {
   const chosen = `mode:${state.model}:${state.mode}`;
@@ -14,7 +23,7 @@ function markMode() {
     button.closest("tr")?.classList.toggle("chosen", own);
     if (own) {
       button.setAttribute("aria-current", "true");
-      button.closest("tr")?.scrollIntoView({ block: "nearest" });
+      showRow(button.closest("tr"));
     } else button.removeAttribute("aria-current");
   }
   const words = pageData.models[state.model]?.modes[state.mode]?.words;

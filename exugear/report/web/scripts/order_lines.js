@@ -1,7 +1,7 @@
 // Order lines in diagrams of speed and frequency: their colours, how they are drawn, and which are chosen.
 import { familyColour, pageColour } from "./colours.js";
 import { pageData } from "./page_data.js";
-import { choose, state } from "./state.js";
+import { choose, chosenResonance, state } from "./state.js";
 
 const families = [...new Set(pageData.lines.map((line) => line.family))];
 
@@ -28,15 +28,14 @@ export function paintLines(plot) {
   const [low, high, top] = [sx.min ?? 0, sx.max ?? 1, sy.max ?? 1];
   /** @type {[number, number, number][]} */
   const taken = [];
-  const order = pageData.lines.map((_, line) => line).sort((a, b) => Number(isOn(b)) - Number(isOn(a)));
-  for (const line of order) {
+  const own = chosenResonance()?.line;
+  for (const line of [...state.lines].sort((a, b) => Number(b === own) - Number(a === own))) {
     const perRpm = pageData.lines[line].order / 60;
     const end = Math.min(high, top / perRpm);
     clipped(plot, (drawing, ratio) => {
       drawing.strokeStyle = lineColour(line);
-      drawing.globalAlpha = isOn(line) ? 1 : 0.55;
-      drawing.lineWidth = (isOn(line) ? 2 : 1) * ratio;
-      drawing.setLineDash((isOn(line) ? dashOf(line) : [2, 5]).map((dash) => dash * ratio));
+      drawing.lineWidth = (line === own ? 2.2 : 1.1) * ratio;
+      drawing.setLineDash(dashOf(line).map((dash) => dash * ratio));
       drawing.beginPath();
       drawing.moveTo(plot.valToPos(low, "x", true), plot.valToPos(perRpm * low, "y", true));
       drawing.lineTo(plot.valToPos(end, "x", true), plot.valToPos(perRpm * end, "y", true));
@@ -58,7 +57,7 @@ function labelLine(plot, line, end, atSide, taken) {
   const ratio = window.devicePixelRatio || 1;
   const { left, top, width } = plot.bbox;
   drawing.save();
-  drawing.font = `${isOn(line) ? 600 : 400} ${11 * ratio}px system-ui, sans-serif`;
+  drawing.font = `${line === chosenResonance()?.line ? 700 : 500} ${11 * ratio}px system-ui, sans-serif`;
   drawing.textAlign = "left";
   drawing.textBaseline = "alphabetic";
   const words = pageData.lines[line].short;

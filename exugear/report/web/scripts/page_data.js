@@ -2,10 +2,10 @@
 
 /** @typedef {{blob: string, type: string, shape: number[], differences: boolean}} ArrayReference */
 /** @typedef {Uint8Array | Int8Array | Uint16Array | Int16Array | Uint32Array | Float32Array} Numbers */
-/** @typedef {{name: string, words: string, unit: string, cells: ArrayReference, floor: number, step: number, spacing: number, first: number, span: [number, number], cuts: ArrayReference, speeds: ArrayReference}} Channel */
-/** @typedef {{frequency: number, tolerance: number, speed: number, peak: number, line: number, level: number, steady: boolean, mode: number | null, facts: [string, string][]}} Resonance */
-/** @typedef {{words: string, model: string, window: string, channels: Channel[], constant: {cuts: ArrayReference, speeds: ArrayReference} | null, resonances: Resonance[], first: number, leading: {mode: number, line: number} | null}} VariantData */
-/** @typedef {{name: string, title: string, words: string, source: string, main: string, variants: Record<string, VariantData>}} GroupData */
+/** @typedef {{name: string, words: string, unit: string, cells: ArrayReference, floor: number, step: number, spacing: number, first: number, knots: [number[], number[]], cuts: ArrayReference, speeds: ArrayReference}} Channel */
+/** @typedef {{frequency: number, tolerance: number | null, speed: number, peak: number, line: number, short: string, level: number, steady: boolean, inside: boolean, mode: number | null, facts: [string, string][], caveats: string[]}} Resonance */
+/** @typedef {{words: string, model: string, window: string, channels: Channel[], constant: {cuts: ArrayReference, speeds: ArrayReference} | null, resonances: Resonance[], first: number}} VariantData */
+/** @typedef {{name: string, title: string, words: string, inertias: string, source: string, main: string, range: [number, number] | null, variants: Record<string, VariantData>}} GroupData */
 /** @typedef {{name: string, short: string, sentence: string, order: number, harmonic: number, family: string}} LineData */
 /** @typedef {{name: string, label: string, owner: string, fixed: boolean, elastic: boolean, colour: string, reference: number[], turn: number, low: number[], span: number[], points: ArrayReference, triangles: ArrayReference}} BodyData */
 /** @typedef {{bodies: BodyData[], centre: number[], diagonal: number, amplitude: number, motions: ArrayReference, deformed: Record<string, Record<string, ArrayReference>>, colours: string[]}} StageData */
@@ -13,7 +13,8 @@
 /** @typedef {{words: string, variant: string, stage: StageData, modes: ModeData[]}} ModelData */
 /** @typedef {{label: string, style: string, right: boolean, x: ArrayReference, y: ArrayReference}} CurveData */
 /** @typedef {{title: string, axes: {label: string, logarithmic: boolean}[], curves: CurveData[], marks: {x: number, label: string}[]}} ChartData */
-/** @typedef {{name: string, input: string, rated: number | null, lines: LineData[], groups: GroupData[], models: Record<string, ModelData>, charts: Record<string, ChartData>, first?: number}} PageData */
+/** @typedef {{label: string, unit: string, speeds: ArrayReference, values: ArrayReference}} SpeedCurve */
+/** @typedef {{name: string, input: string, rated: number | null, lines: LineData[], groups: GroupData[], models: Record<string, ModelData>, charts: Record<string, ChartData>, curves?: SpeedCurve[], first?: number}} PageData */
 
 /** @param {string} id @returns {string} */
 function textOf(id) {

@@ -4,9 +4,10 @@ import { drawCuts } from "./cuts.js";
 import { drawDetail } from "./detail.js";
 import { find } from "./dom.js";
 import { beginModeView, drawMode } from "./mode_view.js";
-import { chosenGroup, fastest, onChange, recall } from "./state.js";
+import { beginSpeedCursor } from "./speed_cursor.js";
+import { onChange, recall } from "./state.js";
 import { beginSwitches, drawSwitches, showChosen } from "./switches.js";
-import { beginLimit, beginTables, drawLimit, markRow } from "./tables.js";
+import { beginTables, filterList, markRow } from "./tables.js";
 import { beginTheme } from "./theme.js";
 import { drawWaterfall } from "./waterfall.js";
 
@@ -20,12 +21,12 @@ async function redraw(changed) {
   /** @type {Promise<unknown>[]} */
   const drawn = [];
   if (hasRuns) {
-    if (any(changed, ["group", "variant", "view", "channel"])) drawSwitches();
+    if (any(changed, ["group", "variant", "view", "channel", "extent"])) drawSwitches();
     if (any(changed, ["group", "variant"])) showChosen();
-    if (any(changed, ["group", "limit"])) drawLimit(fastest(chosenGroup()));
+    if (any(changed, ["group", "variant", "extent"])) filterList();
     markRow();
     drawDetail();
-    const over = ["group", "variant", "view", "channel", "limit", "resonance", "lines"];
+    const over = ["group", "variant", "view", "channel", "extent", "resonance", "lines"];
     if (any(changed, over)) drawn.push(drawWaterfall(), drawCuts());
   }
   if (any(changed, ["model", "mode"])) drawn.push(drawMode());
@@ -45,8 +46,8 @@ function recolour(all) {
 beginTheme(recolour);
 function begin() {
   beginSwitches();
-  if (hasRuns) beginLimit();
   beginTables();
+  beginSpeedCursor();
   beginModeView();
   recall();
   beginCharts();

@@ -1,7 +1,12 @@
 // What is chosen on the page. It stands in the address, so that a view can be sent on.
 import { pageData } from "./page_data.js";
 
-/** @typedef {{group: string, variant: string, view: string, channel: string, resonance: number, model: string, mode: number, lines: number[], limit: number}} State */
+/** @typedef {{group: string, variant: string, view: string, channel: string, resonance: number, model: string, mode: number, lines: number[], extent: string}} State */
+
+/** Which resonances are listed and circled. */
+const EXTENTS = ["first", "range", "all"];
+/** Number of resonances of the shortest list. */
+const FIRST = 10;
 
 /** @type {State} */
 export const state = {
@@ -13,10 +18,10 @@ export const state = {
   model: "",
   mode: -1,
   lines: [],
-  limit: 0,
+  extent: "first",
 };
 
-/** Stands for the first resonance of the ranking: no place, so that it falls back to it. */
+/** Stands for the first resonance of the list: no place, so that it falls back to it. */
 const LOUDEST = -2;
 
 /** @type {((changed: Set<string>) => void)[]} */
@@ -34,11 +39,26 @@ export const chosenVariant = () => chosenGroup()?.variants[state.variant];
 /** @returns {import("./page_data.js").Resonance | undefined} */
 export const chosenResonance = () => chosenVariant()?.resonances[state.resonance];
 
-/** @param {import("./page_data.js").GroupData | undefined} group @returns {number} highest speed of its run-ups, rpm */
-export function fastest(group) {
-  if (!group) return 0;
-  return Math.ceil(Math.max(...Object.values(group.variants).map((variant) => variant.channels[0].span[1])));
+/** @param {import("./page_data.js").GroupData} group @returns {[number, number]} all of its speeds, rpm */
+export function allSpeeds(group) {
+  const ends = Object.values(group.variants).map((variant) => variant.channels[0].knots[0]);
+  return [Math.min(...ends.map((own) => own[0])), Math.max(...ends.map((own) => own[own.length - 1]))];
 }
+
+/** @param {import("./page_data.js").GroupData} group @returns {[number, number]} speeds that are shown first, rpm */
+export function firstSpeeds(group) {
+  const [low, high] = allSpeeds(group);
+  if (!group.range || state.extent === "all") return [low, high];
+  const ends = [Math.max(low, 0.8 * group.range[0]), Math.min(high, 1.15 * group.range[1])];
+  return ends[0] < ends[1] ? [ends[0], ends[1]] : [low, high];
+}
+
+/** Whether a resonance of the list is shown. @param {boolean} inside @param {number} place @returns {boolean} */
+export const isShown = (inside, place) => state.extent === "all" || (inside && (state.extent === "range" || place < FIRST));
+
+/** Resonances that are shown, with their places. */
+export const shownResonances = () =>
+  (chosenVariant()?.resonances ?? []).map((own, place) => ({ own, place })).filter(({ own, place }) => isShown(own.inside, place));
 
 /**
  * Choose something; what does not fit falls back to what does.
@@ -81,8 +101,10 @@ function mendRuns(group, choice) {
     state.resonance = variant.first;
   }
   if (!count) state.resonance = -1;
-  const top = fastest(group);
-  if (!(state.limit > 0 && state.limit <= top)) state.limit = top;
+  if (!EXTENTS.includes(state.extent)) state.extent = EXTENTS[0];
+  const chosen = variant.resonances[state.resonance];
+  // What is chosen is listed, too.
+  if (chosen && !isShown(chosen.inside, state.resonance)) state.extent = chosen.inside ? "range" : "all";
   state.lines = state.lines.filter((line) => pageData.lines[line]);
   const moved = "resonance" in choice || "variant" in choice || "group" in choice;
   if (moved) followResonance(variant, choice);
@@ -99,12 +121,15 @@ export const chooseLoudest = (choice) => choose({ ...choice, resonance: LOUDEST 
  */
 function followResonance(variant, choice) {
   if (!("model" in choice)) state.model = variant.model;
-  // The first resonance of the ranking may be no peak of the transmission error: its mode and order are shown then.
-  const own = variant.resonances[state.resonance] ?? (state.resonance === -1 ? variant.leading : null);
+  const own = variant.resonances[state.resonance];
   if (!own) return;
   if (!("mode" in choice)) state.mode = own.mode ?? -1;
-  if (!("lines" in choice)) state.lines = [own.line];
+  // One order of each mesh, and that of the resonance.
+  if (!("lines" in choice)) state.lines = [...new Set([...firstHarmonics(), own.line])].filter((line) => line >= 0);
 }
+
+/** @returns {number[]} the mesh orders among the orders */
+export const firstHarmonics = () => pageData.lines.flatMap((line, place) => (line.harmonic === 1 ? [place] : []));
 
 function remember() {
   const kept = new URLSearchParams();
@@ -121,11 +146,11 @@ export function recall() {
   /** @type {Partial<State>} */
   const told = {};
   const given = new URLSearchParams(location.hash.slice(1));
-  for (const key of /** @type {const} */ (["group", "variant", "view", "channel", "model"])) {
+  for (const key of /** @type {const} */ (["group", "variant", "view", "channel", "model", "extent"])) {
     const value = given.get(key);
     if (value) told[key] = value;
   }
-  for (const key of /** @type {const} */ (["resonance", "mode", "limit"])) {
+  for (const key of /** @type {const} */ (["resonance", "mode"])) {
     const value = given.get(key);
     if (value !== null && value !== "" && Number.isFinite(Number(value))) told[key] = Number(value);
   }

@@ -1,7 +1,6 @@
 // Tables that Python made: sorted, filtered, taken away as data, and their rows chosen.
-import { find, make, need, say } from "./dom.js";
+import { find, make, say } from "./dom.js";
 import { saveTable } from "./downloads.js";
-import { pageData } from "./page_data.js";
 import { choose, state } from "./state.js";
 
 /** @param {HTMLTableElement} table @returns {HTMLTableRowElement[]} */
@@ -14,10 +13,12 @@ export function beginTables() {
     if (table.id) addCsv(table);
   }
   document.addEventListener("click", (event) => {
+    const caveat = event.target instanceof Element ? event.target.closest(".caveat") : null;
+    if (caveat) say(caveat.getAttribute("title") ?? "");
     const chosen = event.target instanceof Element ? event.target.closest("[data-choice]") : null;
-    if (chosen instanceof HTMLElement) chooseByName(chosen.dataset.choice ?? "");
+    if (chosen) chooseByName(chosen.getAttribute("data-choice") ?? "");
   });
-  for (const name of ["filter", "only-lacking", "limit"]) find(name)?.addEventListener("input", filterRanking);
+  find("filter")?.addEventListener("input", filterList);
 }
 
 /** @param {string} choice such as resonance:GROUP:VARIANT:NUMBER */
@@ -77,50 +78,23 @@ function plain(cell) {
   return cell.dataset.order ?? (text === "–" ? "" : text);
 }
 
-/** Show the rows of the ranking that fit; the same for all of its tables. */
-export function filterRanking() {
+/** Show the rows of the lists of resonances that fit. */
+export function filterList() {
   const words = /** @type {HTMLInputElement | null} */ (find("filter"))?.value.toLowerCase() ?? "";
-  const lacking = /** @type {HTMLInputElement | null} */ (find("only-lacking"))?.checked ?? false;
-  for (const table of document.querySelectorAll("table")) {
-    if (!table.id.startsWith("ranking-")) continue;
-    for (const row of rowsOf(table)) {
-      const said = (row.textContent ?? "").toLowerCase();
-      const speed = Number(row.cells[2].dataset.order);
-      row.hidden = !said.includes(words) || (lacking && !said.includes("absent")) || speed > state.limit + 1e-9;
-    }
+  for (const row of /** @type {NodeListOf<HTMLTableRowElement>} */ (document.querySelectorAll("#ranking .listed tbody tr"))) {
+    const said = (row.textContent ?? "").toLowerCase();
+    const beyond = row.classList.contains("outside") ? state.extent !== "all" : row.classList.contains("further") && state.extent === "first";
+    row.hidden = beyond || !said.includes(words);
   }
 }
 
-/** Mark the row of the chosen resonance. */
+/** Mark the chosen resonance in the list and in the drawings. */
 export function markRow() {
   const chosen = `resonance:${state.group}:${state.variant}:${state.resonance}`;
-  for (const row of document.querySelectorAll("tr[data-choice]")) {
-    const own = row instanceof HTMLElement && row.dataset.choice === chosen;
-    row.classList.toggle("chosen", own);
-    if (own) row.setAttribute("aria-current", "true");
-    else row.removeAttribute("aria-current");
+  for (const own of document.querySelectorAll("tr[data-choice], g[data-choice]")) {
+    const on = own.getAttribute("data-choice") === chosen;
+    own.classList.toggle("chosen", on);
+    if (on) own.setAttribute("aria-current", "true");
+    else own.removeAttribute("aria-current");
   }
-}
-
-/** Range of speeds: a slider, and a button for those around the rated one. */
-export function beginLimit() {
-  const slider = /** @type {HTMLInputElement | null} */ (find("limit"));
-  if (!slider) return;
-  slider.addEventListener("input", () => choose({ limit: Number(slider.value) }));
-  const rated = pageData.rated;
-  if (rated === null) return;
-  const button = need("rated");
-  button.hidden = false;
-  button.addEventListener("click", () => choose({ limit: Math.ceil(1.25 * rated) }));
-}
-
-/** @param {number} top highest speed, rpm */
-export function drawLimit(top) {
-  const slider = /** @type {HTMLInputElement | null} */ (find("limit"));
-  if (!slider) return;
-  slider.min = String(Math.min(top, Math.max(1, Math.round(top / 40))));
-  slider.max = String(top);
-  slider.value = String(state.limit);
-  need("limit-shown").textContent = `${state.limit} rpm`;
-  filterRanking();
 }

@@ -7,12 +7,9 @@ import { amplitudeOf, figureText } from "./numbers.js";
 import { clipped, paintLines, toggleLine } from "./order_lines.js";
 import { pageData } from "./page_data.js";
 import { axisOf, drawPlot, plotIn, zoomButtons } from "./plots.js";
-import { choose, chosenGroup, chosenResonance, chosenVariant, state } from "./state.js";
+import { showSpeed } from "./speed_cursor.js";
+import { allSpeeds, choose, chosenGroup, chosenResonance, chosenVariant, firstHarmonics, firstSpeeds, shownResonances, state } from "./state.js";
 
-const SHOWN = 15;
-const NUMBERED = 5;
-/** dB below the loudest of what sets the height of the diagram. */
-const TALK = 45;
 const HINT = "Drag to zoom. Click a circle or an order line.";
 
 /** @type {import("./heat.js").Heat | null} */
@@ -21,13 +18,6 @@ let asked = 0;
 
 /** @returns {HTMLElement} */
 const box = () => /** @type {HTMLElement} */ (need("waterfall").querySelector(".plot"));
-
-/** Resonances that are in the range of speeds, with their places. */
-const inRange = () =>
-  (chosenVariant()?.resonances ?? [])
-    .map((own, place) => ({ own, place }))
-    .filter(({ own }) => own.speed <= state.limit + 1e-9)
-    .slice(0, SHOWN);
 
 /** Draw what is chosen; of several calls the last one wins. */
 export async function drawWaterfall() {
@@ -47,28 +37,27 @@ export async function drawWaterfall() {
 }
 
 function drawFrame() {
-  if (!heat) return;
+  const group = chosenGroup();
+  if (!heat || !group) return;
   const { field } = heat;
   const highest = frequencyOf(field, field.rows - 1);
   /** @type {import("./plots.js").Bounds} */
-  const bounds = { x: [0, state.limit], y: [0, highest] };
-  const loud = chosenVariant()?.resonances ?? [];
-  const talk = Math.max(300, ...loud.filter((own) => own.level > loud[0].level - TALK).map((own) => own.peak));
-  // What is loud, and the first harmonic of every mesh up to the highest speed.
-  const wanted = Math.max(1.25 * talk, ...firstHarmonics().map((order) => (order * state.limit) / 60));
-  const home = { x: bounds.x, y: /** @type {[number, number]} */ ([0, Math.min(highest, wanted)]) };
+  const bounds = { x: [0, allSpeeds(group)[1]], y: [0, highest] };
+  const speeds = firstSpeeds(group);
+  // The listed resonances, and the first harmonic of every mesh up to the highest speed.
+  const peaks = shownResonances().map(({ own }) => 1.15 * own.peak);
+  const orders = firstHarmonics().map((line) => (pageData.lines[line].order * speeds[1]) / 60);
+  const home = { x: speeds, y: /** @type {[number, number]} */ ([0, Math.min(highest, Math.max(10, ...peaks, ...orders))]) };
   const before = plotIn(box());
-  const kept = before && before.bounds.x[1] === state.limit ? shownPart(before.plot) : null;
-  const plot = drawPlot(box(), frameOptions(), [[0, state.limit], [0, highest]], bounds, home);
+  const same = before && JSON.stringify([before.home.x, before.bounds]) === JSON.stringify([home.x, bounds]);
+  const kept = before && same ? shownPart(before.plot) : null;
+  const plot = drawPlot(box(), frameOptions(), [bounds.x, [0, highest]], bounds, home);
   if (kept) {
     plot.setScale("x", { min: kept.x[0], max: kept.x[1] });
     plot.setScale("y", { min: kept.y[0], max: Math.min(kept.y[1], highest) });
   }
   plot.over.addEventListener("click", (event) => clicked(plot, event));
 }
-
-/** @returns {number[]} orders of the meshes */
-const firstHarmonics = () => pageData.lines.filter((line) => line.harmonic === 1).map((line) => line.order);
 
 /** @param {Plot} plot @returns {import("./plots.js").Bounds} */
 function shownPart(plot) {
@@ -102,14 +91,17 @@ function paintCells(plot) {
   clipped(plot, (drawing) => {
     if (!heat) return;
     const { field, canvas } = heat;
-    const [low, high] = field.channel.span;
-    const x = [plot.valToPos(low, "x", true), plot.valToPos(high, "x", true)];
+    const [speeds, columns] = field.channel.knots;
     const edge = 0.5 * field.channel.spacing;
     const y = [frequencyOf(field, 0) - edge, frequencyOf(field, field.rows - 1) + edge].map((frequency) =>
       plot.valToPos(frequency, "y", true),
     );
-    drawing.imageSmoothingEnabled = (x[1] - x[0]) / field.columns < 6;
-    drawing.drawImage(canvas, x[0], y[1], x[1] - x[0], y[0] - y[1]);
+    for (let piece = 0; piece < columns.length - 1; piece++) {
+      const x = [plot.valToPos(speeds[piece], "x", true), plot.valToPos(speeds[piece + 1], "x", true)];
+      const count = columns[piece + 1] - columns[piece];
+      drawing.imageSmoothingEnabled = (x[1] - x[0]) / count < 6;
+      drawing.drawImage(canvas, columns[piece], 0, count, field.rows, x[0], y[1], x[1] - x[0], y[0] - y[1]);
+    }
   });
 }
 
@@ -117,8 +109,7 @@ function paintCells(plot) {
 function paintResonances(plot) {
   if (state.channel !== "overall") return;
   clipped(plot, (drawing, ratio) => {
-    const zoomed = (plot.scales.x.max ?? 1) - (plot.scales.x.min ?? 0) < 0.6 * state.limit;
-    for (const { own, place } of inRange()) {
+    for (const { own, place } of shownResonances()) {
       const on = own === chosenResonance();
       const [x, y] = [plot.valToPos(own.speed, "x", true), plot.valToPos(own.peak, "y", true)];
       for (const [colour, width] of /** @type {[string, number][]} */ ([["--panel", 4.5], ["--mark", on ? 2.6 : 1.5]])) {
@@ -129,16 +120,14 @@ function paintResonances(plot) {
         drawing.strokeStyle = pageColour(colour);
         drawing.stroke();
       }
-      if (on || place < NUMBERED || zoomed) {
-        drawing.font = `700 ${12 * ratio}px system-ui, sans-serif`;
-        drawing.textAlign = "left";
-        drawing.lineWidth = 3 * ratio;
-        drawing.setLineDash([]);
-        drawing.strokeStyle = pageColour("--panel");
-        drawing.strokeText(String(place + 1), x + 10 * ratio, y - 8 * ratio);
-        drawing.fillStyle = pageColour("--mark");
-        drawing.fillText(String(place + 1), x + 10 * ratio, y - 8 * ratio);
-      }
+      drawing.font = `700 ${12 * ratio}px system-ui, sans-serif`;
+      drawing.textAlign = "left";
+      drawing.lineWidth = 3 * ratio;
+      drawing.setLineDash([]);
+      drawing.strokeStyle = pageColour("--panel");
+      drawing.strokeText(String(place + 1), x + 10 * ratio, y - 8 * ratio);
+      drawing.fillStyle = pageColour("--mark");
+      drawing.fillText(String(place + 1), x + 10 * ratio, y - 8 * ratio);
     }
   });
 }
@@ -151,14 +140,15 @@ function paintResonances(plot) {
 function nearest(plot, left, top) {
   let best = null;
   let distance = 15;
-  for (const { own, place } of state.channel === "overall" ? inRange() : []) {
+  for (const { own, place } of state.channel === "overall" ? shownResonances() : []) {
     const apart = Math.hypot(plot.valToPos(own.speed, "x") - left, plot.valToPos(own.peak, "y") - top);
     if (apart < distance) [best, distance] = [{ place }, apart];
   }
   if (best) return best;
   distance = 7;
   const speed = plot.posToVal(left, "x");
-  pageData.lines.forEach((own, line) => {
+  state.lines.forEach((line) => {
+    const own = pageData.lines[line];
     const here = plot.valToPos((own.order / 60) * speed, "y") - top;
     const further = plot.valToPos((own.order / 60) * plot.posToVal(left + 1, "x"), "y") - top;
     const apart = Math.abs(here) / Math.hypot(1, further - here);
@@ -186,6 +176,7 @@ function hovered(plot) {
     tip.hidden = true;
     return;
   }
+  showSpeed(plot.posToVal(left, "x"));
   const { field, other } = heat;
   const speed = plot.posToVal(left, "x");
   const frequency = plot.posToVal(top, "y");
@@ -218,7 +209,7 @@ function resonanceWords(place) {
   const own = chosenVariant()?.resonances[place];
   if (!own) return "";
   const where = `${figureText(own.frequency, 4)} Hz at ${figureText(own.speed, 4)} rpm`;
-  return `No. ${place + 1}: ${where}, ${figureText(own.level)} dB, ${pageData.lines[own.line].sentence}`;
+  return `No. ${place + 1}: ${where}, ${figureText(own.level)} dB, ${own.short}`;
 }
 
 /** @param {string} channel @param {string} variant @param {string} other */
@@ -230,7 +221,7 @@ function tell(channel, variant, other) {
   if (named) named.textContent = title;
   const hint = need("waterfall").querySelector(".hint");
   if (hint) hint.textContent = `Source: ${source}. ${HINT}`;
-  const loudest = inRange().slice(0, 3).map(({ place }) => resonanceWords(place)).join("; ");
+  const loudest = shownResonances().slice(0, 3).map(({ place }) => resonanceWords(place)).join("; ");
   box().setAttribute("aria-label", `${title}, ${source}. ${loudest}. Arrow keys move, plus and minus zoom, 0 shows all.`);
   const { top, field } = heat;
   const bar = make("i", { class: "bar" });

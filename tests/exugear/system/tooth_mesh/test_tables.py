@@ -33,7 +33,7 @@ def computed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     case.write_text(CASE, encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
-        outcome = exugear("ste", case, "--grid", "--out", folder / "out")
+        outcome = exugear("ste", case, "--grid", "--all", "--out", folder / "out")
     assert outcome.exit_code == 0, outcome.stderr
     assert "64/64" in outcome.stdout
     return case, folder / "out"

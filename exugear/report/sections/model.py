@@ -1,28 +1,44 @@
-"""Section "Assumptions and checks": assumptions, checks, all inputs, provenance, glossary."""
+"""Part "Model and checks": warnings, models compared, modes near a frequency, studies, assumptions, provenance."""
 
 from __future__ import annotations
 
 import json
+import math
 import platform
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from exugear.gearbox.choice import Choice
 from exugear.gearbox.load_cases import static_load_in_words
 from exugear.gearbox.units import RPM
-from exugear.report.findings.context import METHOD_LABELS, choice_of, model_label
-from exugear.report.findings.result_checks import run_figures
-from exugear.report.sections.material import ChartAxis, Curve, Part, ReportData, model_name
+from exugear.report.findings.context import (
+    MESH_MODEL_LABELS,
+    METHOD_LABELS,
+    REFERENCE_VARIANT,
+    VISIBLE_SHARE,
+    choice_of,
+    model_label,
+)
+from exugear.report.findings.facts import facts_of
+from exugear.report.findings.groups import RunGroup
+from exugear.report.findings.result_checks import run_figures, validity_checks
+from exugear.report.pictures.png import png_address
+from exugear.report.sections.material import ChartAxis, Curve, Part, ReportData, group_words, model_name
 from exugear.report.web.document import libraries, licences
-from exugear.report.web.html import Figure, Table, render
-from exugear.results.folder import times_spent
+from exugear.report.web.html import Cell, Figure, Table, render
+from exugear.results.findings import Finding
+from exugear.results.folder import StoredStudy, stored_studies, times_spent
 from exugear.results.run_file import invalidity_of
 from exugear.results.solver_comparison import EXUDYN_FOLDER, compare_solvers
-from exugear.results.spectra.run_spectra import VariantRun
+from exugear.results.spectra.run_spectra import NEAR, ModeReport, VariantRun, nearest_mode, report_mode
 from exugear.system.modal_damping import damping_in_words
+from exugear.system.modes import modes_of
+from exugear.system.sensitivity import FrequencyMatch, assumed_parameters, frequency_matches
 from fe_ste.tools.files import FileError
 
 PACKAGES = ("exugear", "exudyn", "numpy", "scipy", "numba", "scikit-fem", "xarray", "h5netcdf", "matplotlib", "pyvista")
@@ -65,12 +81,19 @@ GLOSSARY = {
 """Terms used on the page."""
 
 
-def trust_section(material: ReportData) -> Part:
-    """List assumptions, checks, inputs and provenance of the results."""
+def model_section(material: ReportData) -> Part:
+    """List checks, models compared, assumptions, inputs and provenance of the results."""
     results = material.results
+    groups = _compared_groups(material)
     inputs = [{"key": key, "value": value} for key, value in flat_keys(material.context.gearbox.content)]
     html = render(
-        "trust",
+        "model",
+        groups=groups,
+        run_ups=any(not group.responses for group in material.groups) or not material.groups,
+        target=_target(material),
+        studies=list(map(_study, stored_studies(material.context.folder, material.context.gearbox))),
+        notes=material.context.notes,
+        missing=material.missing,
         assumptions=_assumptions(material),
         source=material.file_words,
         runs=Table(
@@ -108,7 +131,7 @@ def trust_section(material: ReportData) -> Part:
         glossary=GLOSSARY,
         licences=licences(),
     )
-    return Part(html, title="Assumptions and checks", name="trust")
+    return Part(html, title="Model and checks", name="model")
 
 
 def _assumptions(material: ReportData) -> list[str]:
@@ -240,3 +263,223 @@ def _version(package: str) -> str:
         return version(package)
     except PackageNotFoundError:
         return "(not installed)"
+
+
+# Checks and findings of each result
+
+
+def _compared_groups(material: ReportData) -> list[dict[str, Any]]:
+    """Return findings and checks of each result group; the command line prints them, too."""
+    notes = material.context.notes
+    content = []
+    for group in material.groups:
+        facts = facts_of(material.context, material.words, group, material.variations)
+        verdicts = _checks(material, group)
+        if group is material.groups[0]:
+            notes.findings.extend(verdicts)
+            notes.statements.extend(f"{verdict.line}." for verdict in verdicts)
+        if not group.responses:
+            several = group_words(material.groups, group)
+            notes.statements.append(f"{several}: Load: {_load_of(material, group)}.")
+            notes.statements.extend(f"{several}: {fact.line}" for fact in facts)
+            if group is not material.groups[0]:
+                notes.statements.extend(f"{several}: {verdict.line}." for verdict in verdicts)
+        content.append({"name": group.name, "scope": _scope(material, group), "facts": facts, "verdicts": verdicts})
+        _note_comparisons(material, group)
+    return content
+
+
+def _checks(material: ReportData, group: RunGroup) -> list[Finding]:
+    """Return the checks of a group with the labels of parts."""
+    found = validity_checks(material.context, group)
+    return [replace(finding, text=material.words.labelled(finding.text)) for finding in found]
+
+
+def _scope(material: ReportData, group: RunGroup) -> str:
+    return (
+        f"{group.title[0].upper()}{group.title[1:]}. Load: {_load_of(material, group)}. Speeds: of the "
+        f"{material.input_words}. Levels: overall transmission error (TE), 0 dB = 1 µm."
+    )
+
+
+def _load_of(material: ReportData, group: RunGroup) -> str:
+    """Describe the load of a group: that of its load case, or the static load."""
+    static = static_load_in_words(material.context.gearbox)
+    loads = sorted({str(run.attributes.get("load", "")) for run in group.runs.values()} - {""})
+    text = f"static load, {static}"
+    if loads and not group.responses:
+        text = f"{'; '.join(loads)} (tables and steady-state responses: {text})"
+    return material.words.labelled(text)
+
+
+def _note_comparisons(material: ReportData, group: RunGroup) -> None:
+    """Note resonances that only one of two variants has; window-dependent ones are not counted."""
+    for variant, comparison in group.comparisons.items():
+        reference = comparison.second.variant
+        here = _only(group, variant, reference)
+        there = _only(group, reference, variant)
+        material.context.notes.statements.append(
+            f"Resonances in {variant} and not in {reference} ({group.title}): {here}. In {reference} and not in "
+            f"{variant}: {there}."
+        )
+
+
+def _only(group: RunGroup, variant: str, other: str) -> str:
+    frequencies = sorted(
+        own.finding.resonance.frequency for own in group.ranked[variant] if own.steady and other in own.lacking
+    )
+    if frequencies:
+        return ", ".join(f"{frequency:.0f}" for frequency in frequencies) + " Hz"
+    return "none"
+
+
+# Modes near a target frequency from the gearbox file or the command line, such as a measured one
+
+
+@dataclass(frozen=True)
+class ModelMatch:
+    """Parameter change that shifts a mode of a model to the target frequency."""
+
+    model: Choice
+    match: FrequencyMatch
+
+    @property
+    def assumption(self) -> str:
+        """Parameter with its value."""
+        return f"{self.match.parameter.label} = {self.match.value:.3g}"
+
+
+def _target(material: ReportData) -> dict[str, Any] | None:
+    """List the modes near the target frequency, and parameter changes that would shift a mode there."""
+    target = material.context.target
+    modes = material.results.modes
+    if target is None or not modes:
+        return None
+    rows = []
+    for model, data in modes.items():
+        nearest = nearest_mode(data, target)
+        visible = nearest_mode(data, target, VISIBLE_SHARE)
+        if nearest is None or visible is None:
+            continue
+        rows += [
+            _near_row(material, model, data, mode, target) for mode in dict.fromkeys([nearest.index, visible.index])
+        ]
+        material.context.notes.statements.append(_statement(model, data, nearest, visible, target))
+    return {
+        "target": target,
+        "near": Table(rows, ("inertia set", "mode shape"), caption=f"Modes near {target:.0f} Hz", name="near"),
+        "visible": 100 * VISIBLE_SHARE,
+        "within": 100 * NEAR,
+        "matches": Table(
+            _matches(material, target),
+            ("inertia set", "assumption", "mode shape"),
+            caption="Assumptions",
+            name="matches",
+        ),
+    }
+
+
+def _near_row(material: ReportData, model: Choice, data: xr.Dataset, index: int, target: float) -> dict[str, object]:
+    mode = report_mode(data, index)
+    return {
+        "variant": model.variant,
+        "inertia set": f"{model.inertias} ({MESH_MODEL_LABELS[model.mesh_model]})",
+        "frequency / Hz": f"{mode.frequency:.1f}",
+        "near": "yes" if mode.is_near(target) else "no",
+        "damping / %": f"{100 * mode.damping_ratio:.2f}",
+        "TE part. / %": f"{100 * mode.share:.1f}",
+        "amplification": Cell(f"{mode.amplification:.2f} ({material.words.of(mode.mesh)})", mode.amplification),
+        "mode shape": material.words.moves(data, index),
+    }
+
+
+def _statement(model: Choice, data: xr.Dataset, nearest: ModeReport, visible: ModeReport, target: float) -> str:
+    factor = float(data.attrs["housing_factor"])
+    subject = f"Variant {model_label(model)}, housing stiffness factor {factor:g}"
+    if visible.is_near(target):
+        return (
+            f"{subject}: mode at {visible.frequency:.0f} Hz near {target:.0f} Hz, TE participation "
+            f"{100 * visible.share:.0f} % ({visible.name})."
+        )
+    if nearest.is_near(target):
+        return (
+            f"{subject}: mode at {nearest.frequency:.0f} Hz near {target:.0f} Hz, but with negligible TE "
+            f"participation ({100 * nearest.share:.2g} %; {nearest.name})."
+        )
+    return (
+        f"{subject}: no mode within {100 * NEAR:g} % of {target:.0f} Hz; the nearest mode with TE participation is at "
+        f"{visible.frequency:.0f} Hz ({visible.name})."
+    )
+
+
+def _matches(material: ReportData, target: float) -> list[dict[str, object]]:
+    """Return the rows of the parameter changes that shift a mode to the target."""
+    found = [
+        ModelMatch(variation.choice, match)
+        for variation in material.variations
+        for match in frequency_matches(variation.variations, target, VISIBLE_SHARE)
+    ]
+    if found:
+        entries = "; ".join(
+            f"{own.assumption} instead of {own.match.parameter.default:g} ({model_label(own.model)}: "
+            f"{own.match.frequency:.0f} Hz)"
+            for own in found
+        )
+        material.context.notes.statements.append(
+            f"Assumptions that shift a mode with TE participation to {target:.0f} Hz: {entries}."
+        )
+    return [_match_row(material, own, target) for own in found]
+
+
+def _match_row(material: ReportData, found: ModelMatch, target: float) -> dict[str, object]:
+    match = found.match
+    data = match.modes.to_dataset()
+    mode = report_mode(data, match.index)
+    return {
+        "variant": found.model.variant,
+        "inertia set": f"{found.model.inertias} ({MESH_MODEL_LABELS[found.model.mesh_model]})",
+        "assumption": material.words.change(match.parameter.label, match.value, match.parameter.default),
+        "frequency / Hz": f"{mode.frequency:.0f}",
+        "TE part. / %": f"{100 * mode.share:.1f}",
+        "amplification": Cell(f"{mode.amplification:.2f} ({material.words.of(mode.mesh)})", mode.amplification),
+        (
+            f"nearest with TE participation in {REFERENCE_VARIANT} / Hz"
+        ): f"{_reference_frequency(material, found, target):.0f}",
+        "mode shape": material.words.moves(data, match.index),
+    }
+
+
+def _reference_frequency(material: ReportData, found: ModelMatch, target: float) -> float:
+    """Return the frequency (Hz) of the nearest visible mode of the reference variant with the same parameter value."""
+    context = material.context
+    match = found.match
+    reference = replace(found.model, variant=REFERENCE_VARIANT)
+    parameters = assumed_parameters(context.gearbox, reference, context.stiffness(found.model.mesh_model))
+    same = next((parameter for parameter in parameters if parameter.label == match.parameter.label), None)
+    assembly = same.build(match.value) if same else context.assembled(reference)
+    nearest = nearest_mode(modes_of(assembly).to_dataset(), target, VISIBLE_SHARE)
+    if nearest:
+        return nearest.frequency
+    return math.nan
+
+
+# Studies
+
+LARGEST_PICTURE = 2_000_000
+"""Maximum size of a picture embedded in the page, bytes."""
+
+
+def _study(study: StoredStudy) -> dict[str, object]:
+    lost = "".join(
+        f", {count} {word}" for count, word in ((study.failed, "failed"), (study.missing, "missing")) if count
+    )
+    return {
+        "title": study.title,
+        "fits": study.fits,
+        "words": f"{study.points} points{lost}. {study.description[:1].upper()}{study.description[1:]}",
+        "pictures": [
+            (png_address(path.read_bytes()), path.stem.replace("_", " "))
+            for path in study.pictures
+            if path.stat().st_size <= LARGEST_PICTURE
+        ],
+    }

@@ -1,33 +1,374 @@
-"""Section "Steady-state response": order cuts, peaks, run-ups that are too fast, modes over speed, sidebands."""
+"""Part "Resonances": the list, waterfall and order cuts, Campbell diagram, modes, and what a response has further."""
 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from exugear.gearbox.choice import Choice
 from exugear.gearbox.load_cases import static_load_in_words, summarise_loads
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.sections.entries import GROUND
 from exugear.gearbox.units import RPM
+from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import METHOD_LABELS, Context, choice_of, model_label
-from exugear.report.findings.words import figure_text
+from exugear.report.findings.groups import RunGroup
+from exugear.report.findings.headline import Headline
+from exugear.report.findings.ranking import HOUSING, SHAFTS, Ranking, Resonance, is_over_speed
+from exugear.report.findings.resonance_list import ListedResonance
+from exugear.report.findings.words import QUANTITIES, figure_text, percentages, rounded_text
+from exugear.report.pictures.speed_diagrams import NUMBERED, CampbellDrawing, campbell_of
 from exugear.report.sections.material import ChartAxis, Curve, Part, ReportData, model_name
-from exugear.report.web.html import Figure, Table, render
+from exugear.report.sections.run_data import is_found_always
+from exugear.report.web.html import Cell, Figure, Table, render
 from exugear.results.run_file import read_run
 from exugear.results.spectra.resonances import MAX_SWEEP_RATIO, run_up_cut, sweep_rate, sweep_severity
-from exugear.results.spectra.run_spectra import VariantRun
+from exugear.results.spectra.run_spectra import WINDOW_FACTORS, AbsenceRule, VariantRun, report_mode
 from exugear.results.spectra.waterfall import OrderLine, order_lines
 from exugear.steady.campbell import Campbell, campbell_from
 from exugear.steady.peaks import Peak, line_name, peaks, planet_sidebands, sidebands
 from exugear.steady.steady_file import settings_of
 from fe_ste.tools.arrays import Floats
 
-SHOWN = 20
-"""Number of peaks in the table."""
+SHOWN = NUMBERED
+"""Number of resonances that the list shows first."""
+CAMPBELL = ((1120.0, 520.0), (352.0, 420.0))
+"""Sizes of the Campbell diagrams."""
+BUILT_UP = 3.0
+"""Deficit (dB) against the level at constant speed from which a run-up counts as too fast for a resonance."""
+NOT_NEAR = "no mode near"
+
+
+def resonances_section(material: ReportData) -> Part:
+    """Show the list of resonances of each result, its diagrams, and all modes."""
+    listed = [
+        _of_group(material, group, variant) for group in material.groups for variant in reversed(list(group.runs))
+    ]
+    headline = material.headline
+    if not listed and headline is not None:
+        listed = [_of_estimate(material, headline)]
+    modes = [(model_name(model), _all_modes(material, model, data)) for model, data in material.results.modes.items()]
+    responses = [_response(material, data) for data in material.results.steady]
+    if not (listed or modes or responses):
+        return Part()
+    _note_growth(material)
+    groups = material.groups
+    words = _groups_text(groups) if groups else ""
+    html = render(
+        "resonances",
+        listed=listed,
+        count=SHOWN,
+        run_ups=any(not group.responses for group in groups),
+        absent=AbsenceRule().description,
+        factors=", ".join(f"{factor:g}" for factor in WINDOW_FACTORS),
+        built_up=BUILT_UP,
+        speed_label=f"{material.input_words} speed / rpm",
+        words=words,
+        waterfall=Figure("waterfall", "Waterfall", f"Source: {groups[0].source}.", words) if groups else None,
+        cuts=Figure("cuts", "Order cuts", "Same speeds as above. Select orders below.", words),
+        animated=bool(modes),
+        modes=modes,
+        responses=responses,
+        ratio=MAX_SWEEP_RATIO,
+    )
+    return Part(html, material.run_data, "Resonances", "ranking")
+
+
+def _groups_text(groups: Sequence[RunGroup]) -> str:
+    group = groups[0]
+    loudest = [own for own in group.ranked[group.main] if own.steady][:3]
+    entries = [
+        f"{own.frequency:.0f} Hz at {own.speed / RPM:.1f} rpm, {figure_text(own.ranking_level)} dB" for own in loudest
+    ]
+    named = f"Highest transmission errors at all speeds, {Variant.of(group.main).label}, {group.source}"
+    return f"{named}: {'; '.join(entries) or 'none found'}."
+
+
+# The list: a table for each variant of a result group, of which scripts show the selected one
+
+
+def _of_group(material: ReportData, group: RunGroup, variant: str) -> dict[str, Any]:
+    listed = material.lists[group.name, variant]
+    ranking = group.rankings[variant]
+    leads = material.headline is not None and group is material.headline.group and variant == group.main
+    prefix = f"resonance:{group.name}:{variant}:"
+    rows = _run_rows(material, group, variant, listed)
+    if group.responses:
+        rows = _response_rows(material, ranking, listed, group, variant)
+    title = f"{Variant.of(variant).label.capitalize()}, inertia set {group.inertias}, {group.source}"
+    table = _table(
+        rows, listed, f"Resonances, {title}", "resonances" if leads else f"resonances-{group.name}-{variant}"
+    )
+    inside = sum(own.inside for own in listed)
+    total = len(ranking.resonances) if group.responses else inside
+    return {
+        "group": group.name,
+        "variant": variant,
+        "title": title,
+        "range": range_text(ranking),
+        "whole": ranking.whole,
+        "count": f"{inside}" if inside >= total else f"first {inside} of {total}",
+        "table": replace(table, choices=[f"{prefix}{number}" for number in range(len(listed))]),
+        "choice": prefix,
+        "note": _list_note(material, ranking, bool(group.responses)),
+        "campbell": _campbells(material, ranking, listed, group.runs[variant].modes),
+    }
+
+
+def _of_estimate(material: ReportData, headline: Headline) -> dict[str, Any]:
+    """Return the list of an estimate from modes and static transmission errors."""
+    ranking = headline.ranking
+    listed = []
+    for own in ranking.resonances[: 2 * SHOWN]:
+        found = headline.mode_of(own)
+        level = 20.0 * math.log10(max(own.amplitudes["error"].amplitude, 1e-12) / 1e-6)
+        mode = None if found is None else found.index
+        listed.append(
+            ListedResonance(OrderLine(own.line, own.order), abs(own.speed), own.frequency, level, True, mode, own)
+        )
+    rows = _response_rows(material, ranking, listed)
+    return {
+        "group": None,
+        "variant": None,
+        "title": f"{Variant.of(headline.choice.variant).label.capitalize()}, {headline.source}",
+        "range": range_text(ranking),
+        "whole": ranking.whole,
+        "count": f"{len(listed)}",
+        "table": _table(rows, listed, "Resonances", "resonances"),
+        "choice": "",
+        "note": "Zero-to-peak amplitudes of single orders. " + note_of(material, headline),
+        "campbell": _campbells(material, ranking, listed, headline.modes),
+    }
+
+
+def _table(rows: list[dict[str, object]], listed: Sequence[ListedResonance], caption: str, name: str) -> Table:
+    kinds = ["" if n < SHOWN and own.inside else "further" if own.inside else "outside" for n, own in enumerate(listed)]
+    texts = ("excited by", "place", "mode shape", "strain energy")
+    hidden = ("from rated / %", "place", "mode", "prominence / dB", "± µm", "strain energy")
+    return Table(rows, texts, caption=caption, name=name, sortable=True, stacked=True, hidden=hidden, kinds=kinds)
+
+
+def range_text(ranking: Ranking) -> str:
+    """Return the evaluated speeds as text."""
+    low, high = (rounded_text(speed / RPM) for speed in ranking.speeds)
+    return f"{low} to {high} rpm"
+
+
+def note_of(material: ReportData, headline: Headline) -> str:
+    """Say what the amplitudes of a ranking are of."""
+    if headline.group is None:
+        return "Estimate: amplification of the mode times static transmission error; exugear steady computes more."
+    if headline.response is None:
+        return "Amplitudes in the run-up; exugear steady adds bearing forces and accelerations at constant speed."
+    return _ranked_by(material, headline.ranking)
+
+
+def _ranked_by(material: ReportData, ranking: Ranking) -> str:
+    band = material.context.gearbox.case.damping.modal_band_percent
+    damping = "half to twice the value used" if band is None else f"{band[0]:g} to {band[1]:g} % of critical"
+    return f"Ranked by {QUANTITIES[ranking.quantity].column} ({ranking.reason}). Range of damping: {damping}."
+
+
+def _list_note(material: ReportData, ranking: Ranking, at_constant: bool) -> str:
+    """Say what the amplitudes of a list are of."""
+    if not at_constant:
+        return "Levels of the overall transmission error in the run-up, dB re 1 µm."
+    text = "Zero-to-peak amplitudes of single orders"
+    resonances = ranking.resonances
+    if resonances and len(resonances[0].amplitudes) > 1:
+        text += (
+            ". Forces and accelerations: largest magnitude of the vector, at the bearing or mount where it is largest; "
+            "of planets the root mean square"
+        )
+    if resonances and "acceleration" in resonances[0].amplitudes:
+        parts = {HOUSING: "of the housing at bearing seats", SHAFTS: "of the shafts at bearings; the housing is rigid"}
+        text += f". Accelerations: {parts.get(ranking.accelerates, f'of {ranking.accelerates} at bearings')}"
+    return f"{text}. {_ranked_by(material, ranking)}"
+
+
+def sorted_quantities(ranking: Ranking, resonance: Resonance) -> list[str]:
+    """Return the quantities of a resonance, that which decides the ranking first."""
+    return sorted(resonance.amplitudes, key=lambda name: name != ranking.quantity)
+
+
+def _response_rows(
+    material: ReportData,
+    ranking: Ranking,
+    listed: Sequence[ListedResonance],
+    group: RunGroup | None = None,
+    variant: str = "",
+) -> list[dict[str, object]]:
+    """Return the rows of resonances with all quantities and their ranks."""
+    largest: dict[str, float] = {}
+    for own in listed:
+        for name, amplitude in (own.resonance.amplitudes if own.resonance else {}).items():
+            largest[name] = max(largest.get(name, 1e-300), amplitude.amplitude)
+    rows = []
+    for number, own in enumerate(listed, start=1):
+        row = _first_cells(material, number, own)
+        assert own.resonance is not None
+        for name in sorted_quantities(ranking, own.resonance):
+            amplitude = own.resonance.amplitudes[name]
+            label = QUANTITIES[name]
+            value = label.factor * amplitude.amplitude
+            caveat = "; ".join(map(material.words.labelled, own.caveats)) if name == ranking.quantity else ""
+            bar = amplitude.amplitude / largest[name]
+            cell = Cell(rounded_text(value), value, bar=bar, kind=name, caveat=caveat)
+            row[f"{label.column} ± / {label.unit}"] = cell
+            if name != ranking.quantity:  # its rank is the number
+                row[f"rank, {name}"] = _number(amplitude.place)
+            if name == ranking.quantity and "force" in largest:
+                row["place"] = material.words.of(amplitude.at) if amplitude.at else "–"
+        if group is not None:
+            row |= _levels_elsewhere(group, variant, own)
+        row |= _mode_cells(material, group, variant, own)
+        rows.append(row)
+    return rows
+
+
+def _run_rows(
+    material: ReportData, group: RunGroup, variant: str, listed: Sequence[ListedResonance]
+) -> list[dict[str, object]]:
+    """Return the rows of resonances of a run-up, with their checks."""
+    if group.responses:
+        return []
+    rows = []
+    for number, own in enumerate(listed, start=1):
+        found = own.peak
+        assert found is not None
+        peak = group.shown_peak(found)
+        row = _first_cells(material, number, own)
+        missed = found.missed if peak is found.peak else 0.0
+        too_fast = f"The run-up is too fast: {missed:.0f} dB are missing." if missed >= BUILT_UP else ""
+        row["level / dB"] = Cell(f"{peak.level:.1f}", peak.level, tag="mind" if too_fast else "", caveat=too_fast)
+        if variant in group.constant:
+            at = found.constant
+            row["constant speed / dB"] = Cell("–", math.nan) if at is None else Cell(f"{at.level:.1f}", at.level)
+        amplitude = 10.0 ** (peak.level / 20.0)
+        row["± µm"] = Cell(figure_text(amplitude, 2), amplitude)
+        row["prominence / dB"] = Cell(figure_text(peak.prominence, 2), peak.prominence)
+        row |= _levels_elsewhere(group, variant, own)
+        row |= _mode_cells(material, group, variant, own)
+        always = is_found_always(own)
+        row["windows"] = Cell("all" if always else "window-dependent", float(always), tag="good" if always else "mind")
+        rows.append(row)
+    return rows
+
+
+def _first_cells(material: ReportData, number: int, own: ListedResonance) -> dict[str, object]:
+    rated = material.context.gearbox.case.operation.rated_speed_rpm
+    rpm = own.speed / RPM
+    row: dict[str, object] = {
+        "No.": Cell(str(number), number, tag="rank"),
+        "speed / rpm": Cell(rounded_text(rpm), rpm),
+        "frequency / Hz": Cell(rounded_text(own.frequency), own.frequency),
+    }
+    if rated is not None:
+        off = 100.0 * (rpm / rated - 1.0)
+        row["from rated / %"] = Cell(f"{off:+.0f}".replace("-", "−").replace("+0", "0").replace("−0", "0"), off)
+    row["excited by"] = material.words.line(own.line)
+    return row
+
+
+def _levels_elsewhere(group: RunGroup, variant: str, own: ListedResonance) -> dict[str, object]:
+    """Return the level of the transmission error of each other variant at a resonance."""
+    row: dict[str, object] = {}
+    for name in (name for name in group.runs if name != variant):
+        level = math.nan if own.peak is None else own.peak.elsewhere[name]
+        cell = Cell(f"{level:.1f}" if math.isfinite(level) else "–", level)
+        if own.peak is not None and name in own.peak.lacking:
+            cell = Cell("absent", math.nan, tag="plain")
+        row[f"TE {Variant.of(name).label} / dB"] = cell
+    return row
+
+
+def _mode_cells(material: ReportData, group: RunGroup | None, variant: str, own: ListedResonance) -> dict[str, object]:
+    headline = material.headline
+    modes = group.runs[variant].modes if group is not None else headline.modes if headline is not None else None
+    if own.mode is None or modes is None:
+        name = own.peak.finding.mode_name if own.peak is not None and modes is None else ""
+        return {"mode": _number(None), "mode shape": material.words.labelled(name) or NOT_NEAR}
+    choice = group.choice(variant) if group is not None else headline.choice if headline is not None else Choice()
+    return {
+        "mode": replace(_number(own.mode + 1), choice=f"mode:{model_name(choice)}:{own.mode}"),
+        "mode shape": material.words.moves(modes, own.mode),
+    }
+
+
+def _number(value: int | None) -> Cell:
+    if value is None:
+        return Cell("–", math.nan)
+    return Cell(str(value), value)
+
+
+def _campbells(
+    material: ReportData, ranking: Ranking, listed: Sequence[ListedResonance], modes: xr.Dataset | None
+) -> list[CampbellDrawing]:
+    """Draw orders and modes with the first resonances of a list, for windows of desktops and phones."""
+    inside = [own for own in listed if own.inside][:SHOWN]
+    if not inside:
+        return []
+    drawn = tuple(Resonance(own.line.name, own.line.order, own.speed, own.frequency, {}) for own in inside)
+    matched = {number: own.mode for number, own in enumerate(inside, start=1) if own.mode is not None}
+    frequencies = np.zeros(0) if modes is None else modes["frequency"].to_numpy()
+    # One line for each mesh, and those of the circles.
+    single = [line for line in material.lines if " × " not in line.name]
+    orders = {round(line.order, 6): line for line in [*(own.line for own in inside), *single]}
+    lines = [(line, material.words.line(line)) for _, line in sorted(orders.items())]
+    rated = material.context.gearbox.case.operation.rated_speed_rpm
+    words = "Orders are lines through the origin, modes are horizontal lines; circles have the numbers of the list."
+    shown = replace(ranking, resonances=drawn)
+    known = matched if modes is not None else {}
+    return [campbell_of(shown, lines, frequencies, known, rated, size, words) for size in CAMPBELL]
+
+
+# All modes of each model
+
+
+def _all_modes(material: ReportData, model: Choice, data: xr.Dataset) -> Table:
+    reports = [report_mode(data, index) for index in range(data.sizes["mode"])]
+    rows = [
+        {
+            "No.": Cell(str(mode.index + 1), mode.index + 1),
+            "Frequency / Hz": Cell(f"{mode.frequency:.1f}", mode.frequency, f"mode:{model_name(model)}:{mode.index}"),
+            "Damping / %": Cell(f"{100 * mode.damping_ratio:.2f}", 100 * mode.damping_ratio),
+            "TE participation / %": Cell(f"{100 * mode.share:.2f}", 100 * mode.share),
+            "Amplification": Cell(f"{mode.amplification:.2f}", mode.amplification),
+            "by mesh": material.words.of(mode.mesh) if mode.amplification >= 0.01 else "–",
+            "Mode shape": material.words.moves(data, mode.index),
+            "Strain energy": percentages(material.words.strain_energy(data, mode.index)),
+        }
+        for mode in reports
+    ]
+    return Table(
+        rows,
+        ("by mesh", "Mode shape", "Strain energy"),
+        caption=f"All {len(rows)} modes of {model_label(model)}",
+        name=f"modes-{model_name(model)}",
+        hidden=("TE participation / %", "by mesh"),
+        sortable=True,
+    )
+
+
+def _note_growth(material: ReportData) -> None:
+    """Note models with growing disturbances."""
+    for model, data in material.results.modes.items():
+        growth = float(data.attrs["growth_rate"])
+        if growth > 0.0:
+            unstable = f"{model_label(model)}: unstable, disturbances grow at up to {growth:.3g} 1/s."
+            material.context.notes.statements.append(unstable)
+
+
+# Further results of each steady-state response
+
+PEAKS = 20
+"""Number of peaks that are compared with run-ups, and listed of a continuation."""
 LEAST_SHARE, SHOWN_CONTRIBUTIONS = 0.05, 3
 """Minimum listed contribution to a resonance, and maximum number of contributions."""
 STRONG = 0.1
@@ -45,14 +386,6 @@ SAME_SPEED = 0.02
 """Relative speed difference within which a peak belongs to the crossing of its order with a mode."""
 
 
-def steady_section(material: ReportData) -> Part:
-    """Show the steady-state responses, each with the run-ups of the same variant, mesh model and inertia set."""
-    if not material.results.steady:
-        return Part()
-    html = render("steady", responses=[_response(material, data) for data in material.results.steady])
-    return Part(html, title="Steady-state response", name="steady")
-
-
 def _response(material: ReportData, data: xr.Dataset) -> dict[str, Any]:
     context = material.context
     choice = choice_of(data.attrs)
@@ -60,7 +393,7 @@ def _response(material: ReportData, data: xr.Dataset) -> dict[str, Any]:
     runs = [run for run in material.results.runs if choice_of(run.attributes) == choice]
     label = f"{model_label(choice)}, {METHOD_LABELS[level]}"
     context.tell(f"steady-state response, {label}")
-    found = peaks(data)[:SHOWN]
+    found = peaks(data)[:PEAKS]
     rates = {str(run.attributes["load_case"]): _unit_rate(run) for run in runs}
     rows = [_row(material, peak, data, rates) for peak in found]
     lost = [row for row in rows if any(value == TOO_FAST for value in row.values())]
@@ -76,7 +409,10 @@ def _response(material: ReportData, data: xr.Dataset) -> dict[str, Any]:
         )
     context.notes.statements.extend(f"Steady-state response, {label}: {warning}" for warning in warnings)
     name = f"{level}-{model_name(choice)}"
+    # Responses over speed are in the list and in the diagrams; continuations turn back and have their own.
+    apart = not is_over_speed(data)
     return {
+        "model": model_name(choice),
         "title": label[0].upper() + label[1:],
         "load": static_load_in_words(context.gearbox),
         "warnings": warnings,
@@ -85,11 +421,10 @@ def _response(material: ReportData, data: xr.Dataset) -> dict[str, Any]:
         "shared": material.words.labelled(str(data.attrs["shared_lines"])),
         "remarks": Table(_remarks(data), ("remark",), caption="Warnings by speed", name=f"remarks-{name}"),
         "speeds": data.sizes["point"] + len(json.loads(str(data.attrs["not_converged"]))),
-        "run_ups": bool(runs),
         "branches": settings_of(data.attrs).branches,
-        "orders": _order_charts(material, data, runs, f"steady-{name}"),
+        "orders": _order_charts(material, data, runs, f"steady-{name}") if apart else [],
         "peaks": Table(
-            rows,
+            rows if apart else [],
             ("order",),
             caption=f"Peaks of the steady-state response, {label}",
             name=f"peaks-{name}",
@@ -103,7 +438,6 @@ def _response(material: ReportData, data: xr.Dataset) -> dict[str, Any]:
         ],
         "sidebands": Table(_sidebands(material, data, peaks(data)), ("sideband", "cause"), name=f"sidebands-{name}"),
         "passages": material.words.labelled(_passages(context, _carriers(context))),
-        "ratio": MAX_SWEEP_RATIO,
     }
 
 
