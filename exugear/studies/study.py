@@ -23,10 +23,11 @@ from exugear.gearbox.reading import GearboxFileError, error_line
 from exugear.gearbox.variant import Variant
 from exugear.gearbox.versions import LIFE, MODES, REDUCTION, RUN, STEADY, STUDY
 from exugear.results.folder import case_digest, read_content
+from exugear.results.sound.radiated_power import radiating_names
 from exugear.steady.mean_system.mean_system import mean_system
 from exugear.steady.mean_system.mesh_waves import mesh_waves
 from exugear.steady.mean_system.rotating_frame import SteadyError
-from exugear.steady.mean_system.signals import mesh_signal_names, named_amplitudes, signal_rows
+from exugear.steady.mean_system.signals import SURFACE_VELOCITY, mesh_signal_names, named_amplitudes, signal_rows
 from exugear.steady.settings import SpeedRange, SteadySettings, check_law
 from exugear.studies.point_results import PointSettings, life_loads
 from exugear.studies.quantities import (
@@ -237,14 +238,18 @@ def errors_of_signals(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choi
 
 
 def _steady_signals(gearbox: Gearbox, choice: Choice) -> list[str]:
-    """Return the names of all signals of a steady-state response, which do not depend on flexibility and mesh model."""
+    """Return the names of all signals of a steady-state response.
+
+    They do not depend on flexibility and mesh model, except for the surface velocity of a flexible housing.
+    """
     variant = Variant.bushing if choice.variant.is_elastic else choice.variant
     law = "iso6336"
     plain = Choice(variant, law, choice.inertias)
     with suppress(BalanceError):
         system = mean_system(assemble(gearbox, plain, mesh_stiffness(gearbox, law)), np.ones(1))
         rows = signal_rows(system, 1.0).names
-        return [signal.name for signal in (*rows, *mesh_signal_names(mesh_waves(system)))]
+        names = [signal.name for signal in (*rows, *mesh_signal_names(mesh_waves(system)))]
+        return [*names, SURFACE_VELOCITY.name] if radiating_names(gearbox, choice.variant) else names
     return []
 
 

@@ -24,6 +24,7 @@ from exugear.project import Project
 from exugear.report.findings.ranking import Ranking, ranking_of
 from exugear.results.findings import Finding
 from exugear.results.sound.over_speed import sound_over_speed
+from exugear.results.sound.radiated_power import radiating_names
 from exugear.steady.findings import LEAST_AMPLITUDE, is_excited, response_findings, shuttling_findings
 from exugear.steady.peaks import bearing_swings, peaks, pulls
 from exugear.steady.settings import (
@@ -35,7 +36,6 @@ from exugear.steady.settings import (
     check_speeds,
     usual_speeds,
 )
-from exugear.system.bearings.stiffness import elastic_names
 from exugear.system.modal_damping import damping_in_words
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from exugear.system.tooth_mesh.tables import Shuttling, shuttling_pairs
@@ -70,11 +70,7 @@ def settings_of_options(
 
 def check_radiating_body(project: Project) -> None:
     """Refuse a ranking by sound power without a flexible housing, before anything is computed."""
-    gearbox = project.gearbox
-    fixed = {
-        body.name for body in gearbox.bodies() if body.fixed and gearbox.case.bodies[body.family].solid is not None
-    }
-    if not (project.choice.variant.is_elastic and fixed & set(elastic_names(gearbox))):
+    if not radiating_names(project.gearbox, project.choice.variant):
         raise BadInputError(
             f"--quantity sound_power: the variant {project.choice.variant} has no flexible housing; use --variant "
             'flexible, and give a fixed body a [bodies.NAME.solid] table and flexibility = "elastic"'

@@ -16,6 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.variant import Variant
+from exugear.system.bearings.stiffness import elastic_names
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Complexes, Floats
 
@@ -81,6 +84,23 @@ def equivalent_power(velocity: Floats, area: float) -> Floats:
     array([1.0275])
     """
     return np.asarray(0.5 * AIR_IMPEDANCE * area * np.square(velocity))
+
+
+def radiating_names(gearbox: Gearbox, variant: Variant) -> tuple[str, ...]:
+    """Names of the bodies of a gearbox whose sound power is computed: flexible solids that are fixed.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> radiating_names(gearbox, Variant.flexible), radiating_names(gearbox, Variant.bushing)
+    (('housing',), ())
+    """
+    flexible = elastic_names(gearbox) if variant.is_elastic else ()
+    return tuple(
+        body.name
+        for body in gearbox.bodies()
+        if body.fixed and body.name in flexible and gearbox.case.bodies[body.family].solid is not None
+    )
 
 
 def radiated_power(assembly: Assembly) -> RadiatedPower | None:

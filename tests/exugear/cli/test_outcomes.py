@@ -151,6 +151,11 @@ def test_an_outcome_is_a_verdict_an_excerpt_and_a_path_and_all_of_it_with_an_opt
     assert whole.splitlines()[-1] == "Results: a/b.nc"
 
 
+def test_further_results_follow_the_verdict_a_line_each(capsys: pytest.CaptureFixture[str]) -> None:
+    outcome = tables.Outcome("Fine", {}, [rows_of(1)], further=["Loud", "Warm"])
+    assert printed(outcome, capsys)[0].splitlines()[:3] == ["Fine", "Loud", "Warm"]
+
+
 def test_many_warnings_are_counted(capsys: pytest.CaptureFixture[str]) -> None:
     outcome = tables.Outcome("Fine", {}, findings=[Finding("warning", f"number {n}") for n in range(9)])
     assert printed(outcome, capsys)[1].splitlines()[-1] == "and 5 more"

@@ -16,7 +16,10 @@ from exugear.steady.settings import METHODS
 from exugear.steady.steady_file import load_response
 from fe_ste.transmission_error.table import MeshTable
 
+from ...optional_libraries import needs_meshio
 from ..cases.bearing import BEARING_CASE
+from ..cases.box import box_content
+from ..cases.case_mutations import toml_text
 from ..cases.command import exugear
 
 pytestmark = pytest.mark.usefixtures("coarse_tables")
@@ -52,6 +55,26 @@ def test_steady_writes_a_response_and_sums_it_up(case):
     page = (case.parent / "out" / "report.html").read_text(encoding="utf-8")
     for words in ("Steady-state response", "Natural frequencies over speed in the fixed frame,", "strongest crossing"):
         assert words in page, words
+
+
+@needs_meshio
+@pytest.mark.validation
+def test_the_sound_power_of_a_flexible_housing_follows_the_verdict_with_its_limits(tmp_path):
+    case = tmp_path / "box.toml"
+    case.write_text(toml_text(box_content(tmp_path)), encoding="utf-8")
+    options = ("--variant", "flexible", "--mesh-model", "line_of_action", "--speeds", "1000:3000", "--points", "9")
+    outcome = steady(case, *options, "--quantity", "sound_power", "--all")
+    assert outcome.exit_code == 0, outcome.stderr
+    first, second = outcome.stdout.splitlines()[:2]
+    assert first.startswith("Highest surface velocity ±")
+    assert second.startswith("Highest sound power ") and "dB(A), upper estimate: " in second
+    assert "Sound power by order at" in outcome.stdout and "third octaves" in outcome.stdout
+    said = " ".join(outcome.stderr.split())
+    assert "12 to 14 dB at 63 Hz" in said and "set bodies.box.solid.band_Hz to 1.5 times" in said
+    sound = json.loads(steady(case, *options, "--json").stdout)["sound"]
+    assert sum(10.0 ** (0.1 * own["level_dBA"]) for own in sound["orders"]) == pytest.approx(
+        10.0 ** (0.1 * sound["level_dBA"]), rel=1e-9
+    )
 
 
 def test_loads_of_runs_and_responses_are_told_and_a_response_can_be_at_that_of_a_load_case(case):

@@ -21,6 +21,8 @@ from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.response import signals
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import load_response, stored_or_computed
+from exugear.studies.quantities import QUANTITIES
+from exugear.studies.study import Output, errors_of_signals
 from exugear.system.loads import LoadTable
 from exugear.transient.compiled.solver import CompiledSystem
 
@@ -190,3 +192,12 @@ def test_no_resonance_in_sound_power_lies_at_or_above_the_limit_of_the_band(data
     everything = [own for own in ranking_of(data).resonances if own.amplitudes["surface_velocity"].place]
     assert [own.frequency for own in found] == [own.frequency for own in everything if own.frequency < 2500.0]
     assert len(found) < len(everything)
+
+
+def test_studies_know_the_surface_velocity_of_a_flexible_housing_alone(housed):
+    velocity = QUANTITIES["loudest_peak"]
+    kept = {"f": Output(velocity, {"signal": "surface_velocity"})}
+    assert kept["f"].units == "m/s"
+    assert not [*errors_of_signals(kept, housed.gearbox, Choice("flexible"))]
+    (refused,) = errors_of_signals(kept, housed.gearbox, Choice("bushing"))
+    assert "outputs.f.signal = 'surface_velocity': no such signal" in refused
