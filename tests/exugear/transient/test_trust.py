@@ -100,10 +100,10 @@ def test_teeth_that_pull_for_the_whole_run_end_with_code_1_and_a_red_box_in_the_
     assert invalidity_of(kept) == reason
     assert json.loads(str(kept["limits"]))["pulling_marked"] == LIMITS.pulling_marked
     page = write_report(tmp_path / "out", target=1000.0).path.read_text(encoding="utf-8")
-    head = page[: page.index('<section id="short"')]
+    head = page[: page.index('<section id="answer"')]
     assert '<div class="alert" role="alert"><strong>Invalid runs' in head
     assert f"rigid/run_up-iso6336-disc/run.nc: {reason}" in head
-    assert "NO, see top of page" in page and "Resonance ranking" in page  # shown all the same
+    assert "NO, see top of page" in page and '<section id="ranking"' in page  # shown all the same
 
 
 def test_a_good_run_is_trusted(tmp_path):
