@@ -182,7 +182,9 @@ def _sound(data: xr.Dataset) -> Iterator[Finding]:
     yield Finding("warning", UPPER_ESTIMATE)
     if left_out := sound.orders_left_out():
         limit = float(sound.surface["limit_Hz"])
-        lowest = [f"{name} at {frequency:.0f} Hz" for name, frequency in left_out[:SHOWN_ORDERS]]
+        # Orders of a single mesh come before combinations.
+        named = sorted(left_out, key=lambda own: " + " in own[0] or " - " in own[0])[:SHOWN_ORDERS]
+        lowest = [f"{name} at {frequency:.0f} Hz" for name, frequency in named]
         more = f" and {len(left_out) - SHOWN_ORDERS} more" if len(left_out) > SHOWN_ORDERS else ""
         keys = ", ".join(f"bodies.{name}.solid.band_Hz" for name in sound.surface["bodies"])
         text = f"sound power without orders above {limit:.4g} Hz, two thirds of the band of the housing; at "
