@@ -153,6 +153,7 @@ def test_a_gear_that_meshes_twice_is_computed_once(monkeypatch: pytest.MonkeyPat
         return compute(gear, *rest, **options)
 
     monkeypatch.setattr(fe_ste.elasticity.flank, "flank_compliance", counted)
+    monkeypatch.setenv("EXUGEAR_FLANKS", "off")  # a test before may have kept it
     gear = dataclasses.replace(GEAR_30, face_width=1.01 * GEAR_30.face_width)
     pair = GearPair(name="pair", pinion=gear, gear=dataclasses.replace(gear, name="other"), centre_distance=90e-3)
     compliance = fe_ste.transmission_error.table.prepared_compliance(dataclasses.replace(WANTED, pair=pair))
