@@ -559,4 +559,4 @@ def test_the_verb_tells_what_limits_and_what_that_rests_on(tmp_path, first):
     _, shares = damage_matrix(data, limits(data))
     assert shares.sum(axis=1) == pytest.approx(np.ones(len(shares)))
     shown = exugear(*arguments)
-    assert "Parts with the largest fatigue damage in 10 years" in shown.stdout
+    assert "Parts with the largest fatigue damage" in shown.stdout

@@ -264,7 +264,7 @@ def test_the_example_of_the_reference_can_be_read():
 
 def verb(folder, content):
     (folder / "a.study.toml").write_text(toml_text({**content, "case": "spur.toml"}), encoding="utf-8")
-    return exugear("study", folder / "a.study.toml", "--workers", "1", "--out", folder / "out")
+    return exugear("study", folder / "a.study.toml", "--workers", "1", "--all", "--out", folder / "out")
 
 
 def damped(folder, limits, **changes):
