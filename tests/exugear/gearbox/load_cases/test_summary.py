@@ -120,7 +120,7 @@ def test_check_prints_torque_speed_and_flanks_of_each_load_case(grc):
     assert rows["speed_driven"]["driven"] is True
     flanks = {"sun_planet": "-", "ring_planet": "+", "intermediate": "+", "high_speed": "-"}
     assert all(row["loaded_flanks"] == flanks and row["doubts"] == [] for row in rows.values())
-    table = exugear("check", grc.source).stdout
+    table = exugear("check", grc.source, "--all").stdout
     assert "-4472" in table and "sun_planet -" in table
 
 
