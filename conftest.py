@@ -33,7 +33,10 @@ def folder_of_flanks() -> Path:
 
 # Processes that work side by side are started by this one and share its folder.
 if "PYTEST_XDIST_WORKER" not in os.environ:
-    os.environ["EXUGEAR_FLANKS"] = str(folder_of_flanks())
+    try:
+        os.environ["EXUGEAR_FLANKS"] = str(folder_of_flanks())
+    except OSError:  # the checkout cannot be written, or another process removed a folder at the same moment
+        os.environ["EXUGEAR_FLANKS"] = "off"
 
 
 @pytest.hookimpl(tryfirst=True)
