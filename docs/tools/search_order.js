@@ -1,13 +1,13 @@
 // Order of the search results: guides before reference, names of Python objects last.
 const CHAPTERS = [
-  ["getting_started/", 12],
-  ["howto/", 12],
-  ["gallery/", 8],
+  ["getting_started/", 6],
+  ["howto/", 6],
+  ["gallery/", 4],
   ["validation/trust", 8],
   ["reference/keys/", 3],
   ["reference/glossary", 2],
   ["reference/python", -12],
-  ["api/", -12],
+  ["reference/rooms/", -14],
   ["reference/modules", -14],
   ["elsewhere/", -8],
   ["development/", -8],

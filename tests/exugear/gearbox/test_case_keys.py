@@ -143,11 +143,14 @@ def test_every_key_is_read(read_keys: set[tuple[str, str]], tmp_path: Path) -> N
 
 @pytest.mark.validation
 def test_every_key_of_pages_and_of_a_life_is_read_in_the_program() -> None:
-    """A key counts as read where it is taken as an attribute, outside the models of the file."""
+    """A key counts as read where it is taken as an attribute or by `si`, outside the models of the file."""
     root = Path(exugear.__file__).parent
     files = [file for file in root.rglob("*.py") if file.parent != root / "gearbox" / "sections"]
     trees = [ast.parse(file.read_text(encoding="utf-8")) for file in files]
     read = {node.attr for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+    calls = [node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Call)]
+    by_name = [call.args[1] for call in calls if ast.unparse(call.func) in ("si", "optional_si")]
+    read |= {argument.value for argument in by_name if isinstance(argument, ast.Constant)}
     keys = {key for kind in LIFE_SECTIONS for key in kind.model_fields}
     keys |= {name.partition(".")[2] for name in ELSEWHERE}
     only_one_value = {"curve"}
