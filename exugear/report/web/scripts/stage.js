@@ -50,7 +50,8 @@ export class Stage {
     this.visible = true;
     new ResizeObserver(() => this.resize()).observe(canvas);
     new IntersectionObserver((entries) => {
-      this.visible = entries[0].isIntersecting;
+      // On a busy machine several changes arrive together: the last one holds.
+      this.visible = entries[entries.length - 1].isIntersecting;
       if (this.visible) this.play();
     }).observe(canvas);
     canvas.addEventListener("keydown", (event) => this.turnByKey(event));
