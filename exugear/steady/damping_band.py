@@ -9,6 +9,7 @@ another damping may lead to another state.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from exugear.steady.settings import Method
 from exugear.system.kernels.modal_damping import modal_matrix
 from exugear.system.modal_damping import with_modal_damping
 from fe_ste.tools.arrays import Booleans, Floats, Integers, SingleComplexes
+from fe_ste.tools.threads import side_by_side
 
 FACTORS = (0.5, 2.0)
 """Factors on the damping where the file states no range."""
@@ -72,18 +74,21 @@ def damping_band(model: HarmonicBalanceModel, method: Method, speed: Floats, amp
     point, line, rises = _highest_peaks(model, quantities, speed, amplitude)
     found = np.zeros((len(point), len(quantities), 2))
     respond = {"linear": linear_response, "parametric": parametric_response}[method]
-    for end, system in enumerate(damping_limits(model.system)):
-        damped = model.with_system(system)
-        for at in np.unique(point):
-            here = np.flatnonzero(point == at)
-            for about in ABOUT:
-                response = respond(damped, damped.at(float(speed[at]) * (1.0 + about)))
-                own_signals = 2.0 * signals(damped, response)[line[here]]
-                for number, quantity in enumerate(quantities):
-                    # A quantity without a peak there counts at the peak's speed: beside it others may rise.
-                    counts = rises[here, number] | (about == 0.0)
-                    own = np.where(counts, quantity.sizes(own_signals).max(axis=1), 0.0)
-                    found[here, number, end] = np.maximum(found[here, number, end], own)
+    damped = [model.with_system(system) for system in damping_limits(model.system)]
+    solves = list(product(range(len(damped)), np.unique(point), ABOUT))
+
+    def sizes_at(solve: tuple[int, int, float]) -> Floats:
+        """Sizes (lines, s) of the quantities in one solution."""
+        end, at, about = solve
+        response = respond(damped[end], damped[end].at(float(speed[at]) * (1.0 + about)))
+        own_signals = 2.0 * signals(damped[end], response)[line[point == at]]
+        return np.stack([quantity.sizes(own_signals).max(axis=1) for quantity in quantities], axis=1)
+
+    for (end, at, about), sizes in zip(solves, side_by_side(sizes_at, solves), strict=True):
+        here = point == at
+        # A quantity without a peak there counts at the peak's speed: beside it others may rise.
+        counts = rises[here] | (about == 0.0)
+        found[here, :, end] = np.maximum(found[here, :, end], np.where(counts, sizes, 0.0))
     return DampingBand(point, line, found, tuple(quantity.name for quantity in quantities))
 
 

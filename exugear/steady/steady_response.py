@@ -40,7 +40,7 @@ from exugear.steady.settings import SteadySettings, check_law, check_speeds
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers, SingleComplexes, Texts
 from fe_ste.tools.display import ReprMixin, TitledRows, value_range
-from fe_ste.tools.threads import one_dense_thread
+from fe_ste.tools.threads import one_dense_thread, side_by_side
 
 LONGEST = 0.4
 """Longest step along a branch: in tenths of the static deflections, and in hundredths of the speed."""
@@ -270,6 +270,8 @@ SLOWEST_BRANCH = 0.01
 """Share of the fastest speed at which a branch from standstill begins."""
 LONGEST_WARNING = 300
 """Letters of a remark."""
+AT_ONCE = 16
+"""Points that two threads solve before progress is shown."""
 Kept = Callable[[SolvedPoints], None]
 
 
@@ -413,10 +415,13 @@ def _solve_from(
             getattr(points, field.name)[first:count] = getattr(known, field.name)[first:count]
     kept = time.monotonic()
     done = count
+    # States of the method `nonlinear` start from the one before.
+    at_once = 1 if solver().method == "nonlinear" else AT_ONCE
     try:
-        for n in range(count, len(points.speed)):
-            _solve_one(points, n, solver())
-            done = n + 1
+        while done < len(points.speed):
+            block = range(done, min(done + at_once, len(points.speed)))
+            side_by_side(lambda n: _solve_one(points, n, solver()), block)
+            done = block.stop
             progress(done, len(points.speed))
             if keep is not None and time.monotonic() - kept > keep_every:
                 keep(points.part(slice(done)))

@@ -27,6 +27,7 @@ from __future__ import annotations
 
 import hashlib
 import struct
+import threading
 from typing import Any, TypeVar, cast
 
 import numba
@@ -84,10 +85,11 @@ def cached_bundle(given: Given) -> Given:
     kept = _latest.get(id(given))
     if kept is None or kept.given is not given:
         kept = _Bundle(given)
-        _latest.pop(id(given), None)
-        _latest[id(given)] = kept
-        while len(_latest) > _MOST_KEPT:
-            _latest.pop(next(iter(_latest)))
+        with _one_thread:
+            _latest.pop(id(given), None)
+            _latest[id(given)] = kept
+            while len(_latest) > _MOST_KEPT:
+                _latest.pop(next(iter(_latest)))
     return cast(Given, kept)
 
 
@@ -103,6 +105,7 @@ class _Bundle:
 
 _latest: dict[int, _Bundle] = {}
 _MOST_KEPT = 64
+_one_thread = threading.Lock()
 
 
 class _BundleType(types.Type):
