@@ -99,8 +99,9 @@ def crossings(
     `operation` (rad/s, without sign) peaks are held against the largest of those there.
     """
     index = model.lines.index[:, : len(model.waves.base_orders)]
-    # Orders of a single mesh frequency, and their sidebands.
-    lines = [int(line) for line in np.flatnonzero(np.count_nonzero(index, axis=1) == 1)]
+    # Orders of a single mesh frequency and their sidebands, or of a shaft.
+    several = np.count_nonzero(index, axis=1) > 1
+    lines = [int(line) for line in np.flatnonzero(~several) if line]
     forces = forcing(model.at(float(model.system.speeds[1])))[lines]
     met = _passages(tracks, model.lines.orders[lines])
     if not met:

@@ -20,6 +20,7 @@ from exugear.steady.harmonics.lines import (
     line_set,
     modulated,
     rank1_lattice,
+    with_shafts,
 )
 from exugear.steady.mean_system.bearing_waves import (
     TILTS,
@@ -59,6 +60,7 @@ from exugear.steady.mean_system.signals import (
     signal_rows,
 )
 from exugear.steady.mean_system.tooth_friction import FrictionResponse, tooth_friction
+from exugear.steady.mean_system.wheel_errors import WheelErrors
 from exugear.system.kernels.meshes import SPIN_1
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
@@ -168,6 +170,7 @@ class HarmonicBalanceModel:
     ----------
     harmonics : of each mesh frequency. The mesh stiffness has twice as many.
     combinations : largest sum of multiples of several mesh frequencies
+    errors : deviations of gears, which add orders of their shafts
 
     Notes
     -----
@@ -175,13 +178,14 @@ class HarmonicBalanceModel:
     of the meshes in all arrays.
     """
 
-    def __init__(self, waves: MeshWaves, harmonics: int, combinations: int) -> None:
+    def __init__(self, waves: MeshWaves, harmonics: int, combinations: int, errors: WheelErrors | None = None) -> None:
         self.waves, self.harmonics = waves, 2 * harmonics
+        self.errors = errors or WheelErrors()
         # Lines of the larger set are kept apart where forces are evaluated in time.
         self._usual = self._reach = HarmonicTruncation(2 * harmonics, 2 * combinations)
         self.lines, self.larger = (
-            _lines_within(waves, HarmonicTruncation(harmonics, combinations)),
-            _lines_within(waves, self._usual),
+            self._lines_within(HarmonicTruncation(harmonics, combinations)),
+            self._lines_within(self._usual),
         )
         self._least = 0
         # Shared by all that differ in their lines alone.
@@ -312,7 +316,7 @@ class HarmonicBalanceModel:
         if not clear:
             other._least = 0
         if reach != self._reach:
-            other._reach, other.larger, other._least = reach, _lines_within(self.waves, reach), 0
+            other._reach, other.larger, other._least = reach, self._lines_within(reach), 0
         return other
 
     def with_system(self, system: MeanSystem) -> HarmonicBalanceModel:
@@ -327,6 +331,21 @@ class HarmonicBalanceModel:
         other.lines = self.lines.part(which)
         return other
 
+    def _lines_within(self, reach: HarmonicTruncation) -> LineSet:
+        """Orders up to a limit, with the sidebands of planets that mesh out of phase, and the orders of shafts."""
+        waves = self.waves
+        lines = line_set(waves.base_orders.tolist(), reach.harmonics, reach.combinations)
+        modulators = [planets for _, planets in waves.carriers]
+        lines = beside(lines, modulators, 0) if waves.passing else modulated(lines, modulators)
+        return with_shafts(lines, self.errors.shafts, len(waves.base_orders), reach.harmonics)
+
+    @cached_property
+    def without_errors(self) -> HarmonicBalanceModel:
+        """The same gearbox with gears that have no deviations; itself if they have none."""
+        if not self.errors.shafts:
+            return self
+        return HarmonicBalanceModel(self.waves, self.usual_harmonics, self._usual.combinations // 2)
+
     @property
     def usual_harmonics(self) -> int:
         """Harmonics of each mesh frequency among its usual lines."""
@@ -338,8 +357,8 @@ class HarmonicBalanceModel:
         combinations = self._usual.combinations
         other.harmonics, other._least = 2 * harmonics, 0
         other._usual = other._reach = HarmonicTruncation(2 * harmonics, combinations)
-        other.lines = _lines_within(self.waves, HarmonicTruncation(harmonics, combinations // 2))
-        other.larger = _lines_within(self.waves, other._usual)
+        other.lines = self._lines_within(HarmonicTruncation(harmonics, combinations // 2))
+        other.larger = self._lines_within(other._usual)
         return other
 
     @cached_property
@@ -347,9 +366,9 @@ class HarmonicBalanceModel:
         """The same with twice the usual harmonics of each mesh frequency, and the usual combinations of several."""
         other = self._copied()
         usual = self._usual
-        other.lines = _lines_within(self.waves, HarmonicTruncation(usual.harmonics, usual.combinations // 2))
+        other.lines = self._lines_within(HarmonicTruncation(usual.harmonics, usual.combinations // 2))
         other._reach = HarmonicTruncation(2 * usual.harmonics, usual.combinations)
-        other.larger = _lines_within(self.waves, other._reach)
+        other.larger = self._lines_within(other._reach)
         return other
 
     def _copied(self) -> HarmonicBalanceModel:
@@ -400,8 +419,8 @@ class HarmonicBalanceModel:
 
     @property
     def base_names(self) -> tuple[str, ...]:
-        """Names of all bases: meshes, and carriers whose rotation causes sidebands of the orders of their planets."""
-        return (*self.waves.base_names, *(name for name, _ in self.waves.carriers))
+        """Names of all bases: meshes, carriers whose planets mesh out of phase, and shafts of gears with deviations."""
+        return (*self.waves.base_names, *(name for name, _ in self.waves.carriers), *self.errors.names)
 
     @property
     def system(self) -> MeanSystem:
@@ -593,10 +612,3 @@ def _stacked(ports: list[MeshInterface]) -> dict[str, Floats]:
     """Arrays of ports at several speeds (speeds, ...), by their names."""
     by_name = {field.name: [getattr(port, field.name) for port in ports] for field in fields(MeshInterface)}
     return {name: np.array(values) for name, values in by_name.items() if values[0] is not None}
-
-
-def _lines_within(waves: MeshWaves, reach: HarmonicTruncation) -> LineSet:
-    """Orders up to a limit, with the sidebands caused by planets that mesh out of phase."""
-    lines = line_set(waves.base_orders.tolist(), reach.harmonics, reach.combinations)
-    modulators = [planets for _, planets in waves.carriers]
-    return beside(lines, modulators, 0) if waves.passing else modulated(lines, modulators)

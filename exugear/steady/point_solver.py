@@ -20,6 +20,7 @@ from exugear.steady.harmonics.lines import LineSet, TorusSampling, joined, large
 from exugear.steady.mean_system.mean_system import mean_system
 from exugear.steady.mean_system.mesh_places import DEFLECTION
 from exugear.steady.mean_system.mesh_waves import FEWEST, mesh_waves
+from exugear.steady.mean_system.wheel_errors import wheel_errors, without_wheel_errors
 from exugear.steady.nonlinear import (
     CHECKED,
     HarmonicResidual,
@@ -31,7 +32,14 @@ from exugear.steady.nonlinear import (
     response_of_readings,
     solve_balance,
 )
-from exugear.steady.response import Response, linear_response, parametric_response, signals, transmission_errors
+from exugear.steady.response import (
+    Response,
+    linear_response,
+    parametric_response,
+    signals,
+    transmission_errors,
+    wheel_error_forces,
+)
 from exugear.steady.settings import Method
 from exugear.steady.settling import SettlingRun, SettlingSegment, cannot_settle
 from exugear.system.system import Assembly
@@ -77,9 +85,10 @@ def harmonic_balance_model(
 
     With contact loss, each state takes as many orders as it needs, starting with few.
     """
-    waves = mesh_waves(mean_system(assembly, speeds))
+    waves = mesh_waves(mean_system(without_wheel_errors(assembly), speeds))
     usual = FEWEST if LAWS[assembly.mesh_model].loses_contact else waves.needed_harmonics()
-    return HarmonicBalanceModel(waves, usual if harmonics is None else harmonics, combinations)
+    errors = wheel_errors(assembly, waves)
+    return HarmonicBalanceModel(waves, usual if harmonics is None else harmonics, combinations, errors)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,13 +148,14 @@ class PointSolver:
     def forcing(self, interface: Interface) -> Complexes:
         """Find the forces of the meshes (lines, m, f) that vary in the static state, N, bearings being linear."""
         if not self.linear.loses_contact:
-            return transmission_errors(self.linear, interface.ports, interface.speed)
+            errors = transmission_errors(self.linear, interface.ports, interface.speed)
+            return errors + wheel_error_forces(self.linear, interface)
         balance = HarmonicResidual(self.linear, interface, self.linear.sampling)
         return balance.forces(balance.static)[0]
 
     def growth(self, low: float, high: float) -> float:
         """Fastest growth of a disturbance between two speeds of the input (rad/s), 1/s."""
-        model = self.linear
+        model = self.linear.without_errors
         found = [mean_growth(model)]
         unknown = model.loses_contact or model.waves.carriers
         for candidate in () if unknown else candidates(model, low, high)[:CHECKED]:

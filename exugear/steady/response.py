@@ -9,6 +9,8 @@ for every order k. Method `linear`: F is the excitation by the static transmissi
 curve of load over deflection is replaced by its tangent k(pmc) at the static load F_0, with the exponent m(pmc):
 
     force k d - (m - 1) F_0 = k (d - e),  e = s - F_0 / k,  s the static transmission error.
+
+Deviations of gears are a given displacement in both methods: see `exugear.steady.mean_system.wheel_errors`.
 """
 
 from __future__ import annotations
@@ -76,7 +78,7 @@ def linear_response(model: HarmonicBalanceModel, interface: Interface) -> Respon
     F = -k_mean e with e = s - mean of s, the transmission error under the static force F_0; of a curve k_mean is the
     mean of the tangent. Where the load shuttles by w, s contains w (g - g0), and F_0 w is a moment.
     """
-    excess = transmission_errors(model, interface.ports, interface.speed)
+    excess = transmission_errors(model, interface.ports, interface.speed) + wheel_error_forces(model, interface)
     deflection = interface.static[..., DEFLECTION] + _answer(interface, excess)[..., DEFLECTION]
     return _response(model, interface, deflection, excess, 0)
 
@@ -98,6 +100,19 @@ def transmission_errors(model: HarmonicBalanceModel, ports: MeshInterface, speed
         found += _products(model, beyond, ports, speed, _everywhere(model, found.shape))
     found[0] = 0.0
     return found
+
+
+def wheel_error_forces(model: HarmonicBalanceModel, interface: Interface) -> Complexes:
+    """Find the forces (n, m, f) of the deviations of gears, -k e - c e' with k over the mesh cycle, N and N m."""
+    ports = interface.ports
+    forces = np.zeros((len(model.lines.index), *ports.forces.shape[:2]), dtype=complex)
+    if not model.errors.shafts:
+        return forces
+    forces[..., DEFLECTION] = -model.errors.displacements(model.lines, model.waves, interface.speed)
+    damped = model.waves.damping * 1j * interface.frequencies[:, None] * forces[..., DEFLECTION]
+    forces = _products(model, model.cycle_tangents, ports, interface.speed, forces)
+    forces[..., DEFLECTION] += damped
+    return forces
 
 
 def _everywhere(model: HarmonicBalanceModel, shape: tuple[int, ...]) -> Complexes:
@@ -143,7 +158,7 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
         add_answered(cached_bundle(coupling.terms), *parts, readings, *memory, octets, out)
         return out
 
-    given = given_forces(model, interface).reshape(shape[0], -1)
+    given = (given_forces(model, interface) + wheel_error_forces(model, interface)).reshape(shape[0], -1)
     start = -(answers @ given[..., None])[..., 0]
     start += lengths * interface.static[..., : shape[2]].reshape(shape[0], -1)
     found, products = solve_lines(apply, start, TOLERANCE)
@@ -217,6 +232,8 @@ def signals(model: HarmonicBalanceModel, response: Response) -> Complexes:
     if levers.any():
         deflection = deflection + response.motion @ levers[:, :-1].T
         deflection[0] += levers[:, -1]
+    if model.errors.shafts:
+        deflection = deflection - model.errors.displacements(model.lines, model.waves, interface.speed)
     found = [of_motion, deflection, response.force]
     if model.radiated is not None:
         # A line of a coefficient c oscillates with the amplitude 2 c.

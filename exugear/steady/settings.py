@@ -167,6 +167,21 @@ def check_law(name: str, method: Method) -> None:
         )
 
 
+def check_deviations(gearbox: Gearbox, method: Method) -> None:
+    """Refuse deviations of gears with the method that evaluates the mesh models in time.
+
+    Raises
+    ------
+    SteadyError
+        The gearbox file has deviations, and the method is ``nonlinear``.
+    """
+    if gearbox.deviations and method == "nonlinear":
+        raise SteadyError(
+            "deviations: the method nonlinear does not include the orders of the shafts; use --method parametric with "
+            "--mesh-model line_of_action, or exugear run"
+        )
+
+
 @dataclass(frozen=True)
 class SteadySettings:
     """What is asked for."""

@@ -148,6 +148,8 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
 def _attributes(response: SteadyResponse) -> dict[str, Any]:
     """Return the attributes of a response as a whole."""
     assembly = response.assembly
+    # A mesh frequency is a multiple of its shafts' rotation by definition.
+    unrelated = len(response.base_names) - response.shafts
     return {
         "gearbox": assembly.gearbox.name,
         "variant": str(assembly.variant),
@@ -171,7 +173,7 @@ def _attributes(response: SteadyResponse) -> dict[str, Any]:
         "mounts": json.dumps(mount_names(assembly)),
         "harmonics": response.harmonics,
         "change_with_more": response.change_with_more,
-        "shared_lines": "; ".join(_shared(row, response.base_names) for row in response.lines.shared()),
+        "shared_lines": "; ".join(_shared(row, response.base_names) for row in response.lines.shared(unrelated)),
         "contributions": json.dumps([{"line": line, **asdict(parts)} for line, parts in response.contributions]),
         "folds": json.dumps(response.folds),
         "branch_ended": response.branch_ended,

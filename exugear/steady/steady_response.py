@@ -36,7 +36,7 @@ from exugear.steady.mean_system.signals import SignalName
 from exugear.steady.nonlinear import HarmonicResidual, Tangent, growth_of_state
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.response import Response, dissipated_and_given, signals
-from exugear.steady.settings import SteadySettings, check_law, check_speeds
+from exugear.steady.settings import SteadySettings, check_deviations, check_law, check_speeds
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers, SingleComplexes, Texts
 from fe_ste.tools.display import ReprMixin, TitledRows, value_range
@@ -224,6 +224,8 @@ class SteadyResponse(ReprMixin):
     many orders as it needs."""
     band: DampingBand
     """How high the highest peaks are with the lowest and the highest plausible damping."""
+    shafts: int
+    """Number of bases, the last ones, that are rotations of shafts whose gears have deviations."""
     campbell: Campbell
     """Modes over the speeds, up to the highest orders that `crossings` evaluates."""
 
@@ -296,6 +298,7 @@ def response_of(
     """
     check_speeds(assembly.gearbox, settings.speeds)
     check_law(assembly.mesh_model, settings.method)
+    check_deviations(assembly.gearbox, settings.method)
     even = settings.speeds.values
     model = harmonic_balance_model(assembly, even, settings.harmonics, settings.combinations)
     solver = PointSolver(model, settings.method)
@@ -334,6 +337,7 @@ def response_of(
         input_hash=settings.hash_with(assembly),
         lines=model.lines,
         base_names=model.base_names,
+        shafts=len(model.errors.shafts),
         wave_names=tuple(wave.name for wave in model.waves.waves),
         signals=model.signal_names,
         bearing_names=solver.model.bearing_names,

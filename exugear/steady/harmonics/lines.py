@@ -35,6 +35,8 @@ from fe_ste.tools.octets import SIZE, all_eight, eight, put
 
 LARGEST_RATIO = 40
 """Integers up to which a ratio of two bases is looked for: harmonics that any set has."""
+MOST_TEETH = 1000
+"""Largest multiple of a shaft's rotation that a mesh frequency is looked for."""
 SAME = 1e-9
 """Relative difference up to which two frequencies are the same."""
 
@@ -59,8 +61,10 @@ class LineSet(ReprMixin, line=": {index!n} lines of {index.shape[1]} bases"):
         """Frequency of each line (n,) over that of the reference, not negative."""
         return np.asarray(self.index @ self.bases)
 
-    def shared(self) -> tuple[tuple[int, ...], ...]:
+    def shared(self, meshes: int | None = None) -> tuple[tuple[int, ...], ...]:
         """Pairs of bases in a ratio of small integers: multiples (bases,) of two of them whose sum is no frequency.
+
+        `meshes` is the number of first bases that are compared; all by default.
 
         Examples
         --------
@@ -68,7 +72,7 @@ class LineSet(ReprMixin, line=": {index!n} lines of {index.shape[1]} bases"):
         ((4, -3, 0),)
         """
         found = []
-        for a, b in itertools.combinations(range(len(self.bases)), 2):
+        for a, b in itertools.combinations(range(len(self.bases[:meshes])), 2):
             column = int(np.argmax(self.units[a]))
             one = int(self.units[a, column])
             other = int(self.units[b, column])
@@ -241,6 +245,56 @@ def beside(lines: LineSet, slow: Sequence[Modulator], most: int) -> LineSet:
     return _lines_of_rows(rows, bases, _with_slow(lines.units, len(slow)))
 
 
+@dataclass(frozen=True)
+class ShaftOrders:
+    """Orders of a shaft whose gears deviate from tooth to tooth."""
+
+    name: str
+    order: float
+    """Its frequency of rotation over that of the reference."""
+    orders: tuple[int, ...]
+    """Multiples of its rotation."""
+    bases: tuple[int, ...]
+    """Bases of the meshes of its gears, each a whole multiple of the rotation: the number of teeth."""
+
+
+def with_shafts(lines: LineSet, shafts: Sequence[ShaftOrders], meshes: int, harmonics: int) -> LineSet:
+    """Return lines with the orders of shafts by themselves and beside the harmonics of their meshes; shafts come last.
+
+    Parameters
+    ----------
+    meshes : number of the lines' bases that are meshes; slow rotations follow them
+    harmonics : of each mesh frequency whose sidebands are included
+
+    Examples
+    --------
+    A pinion with five teeth whose first order matters:
+
+    >>> lines = with_shafts(line_set([5.0], 1), [ShaftOrders("pinion", 1.0, (1,), (0,))], 1, 1)
+    >>> [tuple(row) for row in lines.index.tolist()], lines.orders.tolist()
+    ([(0, 0), (0, 1), (1, -1), (1, 0), (1, 1)], [0.0, 1.0, 4.0, 5.0, 6.0])
+    """
+    if not shafts:
+        return lines
+    first = len(lines.bases)
+    bases = np.append(lines.bases, [shaft.order for shaft in shafts])
+    rows = np.hstack([lines.index, np.zeros((len(lines.index), len(shafts)), dtype=np.int64)])
+    more = []
+    for place, shaft in enumerate(shafts):
+        for order, base in itertools.product(shaft.orders, shaft.bases):
+            for harmonic in range(-harmonics, harmonics + 1):
+                row = np.zeros(len(bases), dtype=np.int64)
+                row[first + place], row[base] = order, harmonic
+                more.append(row)
+    # Shafts lead the search for common frequencies: meshes are whole multiples of their rotation, however many teeth.
+    lead = [*range(first, len(bases)), *range(meshes)]
+    shared = _independent(bases[lead], whole=MOST_TEETH)
+    units = np.zeros((len(bases), shared.shape[1] + first - meshes), dtype=np.int64)
+    units[lead, : shared.shape[1]] = shared
+    units[meshes:first, shared.shape[1] :] = np.eye(first - meshes, dtype=np.int64)
+    return _lines_of_rows(np.vstack([rows, *more]), bases, units)
+
+
 def joined(one: LineSet, other: LineSet) -> LineSet:
     """Lines of two sets of the same bases."""
     return _lines_of_rows(np.vstack([one.index, other.index]), one.bases, one.units)
@@ -287,24 +341,28 @@ def _lines_of_rows(rows: Integers, bases: Floats, units: Integers) -> LineSet:
     return LineSet(index, bases, units)
 
 
-def _independent(bases: Floats) -> Integers:
-    """Multiples (bases, independent) of independent frequencies that give the bases: greatest common divisors."""
+def _independent(bases: Floats, whole: int = LARGEST_RATIO) -> Integers:
+    """Multiples (bases, independent) of independent frequencies that give the bases: greatest common divisors.
+
+    `whole` is the largest multiple of a base that another one may be.
+    """
     groups: list[list[tuple[int, Fraction]]] = []
     for n, base in enumerate(bases):
         for group in groups:
             ratio = base / bases[group[0][0]]
             near = Fraction(ratio).limit_denominator(LARGEST_RATIO)
-            if near.numerator <= LARGEST_RATIO and abs(ratio - near) < SAME * ratio:
+            most = whole if near.denominator == 1 else LARGEST_RATIO
+            if near.numerator <= most and abs(ratio - near) < SAME * ratio:
                 group.append((n, near))
                 break
         else:
             groups.append([(n, Fraction(1))])
     units = np.zeros((bases.size, len(groups)), dtype=np.int64)
     for column, group in enumerate(groups):
-        whole = math.lcm(*(near.denominator for _, near in group))
-        common = math.gcd(*(int(near * whole) for _, near in group))
+        shared = math.lcm(*(near.denominator for _, near in group))
+        common = math.gcd(*(int(near * shared) for _, near in group))
         for n, near in group:
-            units[n, column] = int(near * whole) // common
+            units[n, column] = int(near * shared) // common
     return units
 
 

@@ -250,6 +250,21 @@ def _has_sectors(gearbox: Gearbox, mesh: Mesh) -> bool:
     return seat is not None and seat.sectors is not None
 
 
+def deviation_lack(gearbox: Gearbox) -> str:
+    """Return which gear's deviations cannot be part of a steady-state response; empty if all can."""
+    carried = {body.name for body in gearbox.bodies() if body.carrier is not None}
+    for mesh in gearbox.meshes:
+        if not {mesh.pinion, mesh.gear} & carried:
+            continue
+        for body, gear in ((mesh.pinion, mesh.pair.pinion.name), (mesh.gear, mesh.pair.gear.name)):
+            if (body, gear) in gearbox.deviations:
+                return (
+                    f"deviations of gear {gear!r} on body {body!r}: it meshes with planets, which the steady-state "
+                    "response does not include; remove them, or use exugear run"
+                )
+    return ""
+
+
 def _check(assembly: Assembly) -> None:
     """Refuse what has no constant matrices, or no single speed."""
     gearbox = assembly.gearbox
@@ -262,11 +277,8 @@ def _check(assembly: Assembly) -> None:
         raise SteadyError("the gear train has no meshes and no excitation; use exugear run instead")
     if assembly.travelling.first.size:
         raise SteadyError(ELASTIC_RING)
-    if gearbox.deviations:
-        raise SteadyError(
-            "deviations: pitch deviations and run-out excite at shaft orders, which the steady-state response does "
-            "not include; remove them, or use exugear run"
-        )
+    if lacking := deviation_lack(gearbox):
+        raise SteadyError(lacking)
     if gearbox.pin_offsets:
         raise SteadyError(
             "pins: position errors cause unequal planet loads that rotate with the carrier, which the steady-state "
