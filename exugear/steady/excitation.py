@@ -11,6 +11,7 @@ import numpy as np
 
 from exugear.results.sound.radiated_power import RadiatedPower, radiated_power
 from exugear.steady.harmonics.lines import (
+    Group,
     HarmonicCoupling,
     LineSet,
     TorusSampling,
@@ -59,7 +60,7 @@ from exugear.steady.mean_system.signals import (
     quantities_of,
     signal_rows,
 )
-from exugear.steady.mean_system.tooth_friction import FrictionResponse, tooth_friction
+from exugear.steady.mean_system.tooth_friction import tooth_friction
 from exugear.steady.mean_system.wheel_errors import WheelErrors
 from exugear.system.kernels.meshes import SPIN_1
 from exugear.system.tooth_mesh.laws.registry import LAWS
@@ -69,6 +70,21 @@ SAMPLES_PER_HARMONIC = 16
 """Minimum samples per mesh period over the harmonics, with contact loss: kinks need more than products of orders."""
 MOST_LINES = 500
 """Combinations up to which lines are looked for: those up to the eighth of three mesh frequencies, the 21st of two."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoadResponse:
+    """Response to loads on the bodies beside the forces along the meshes' rows at one speed; n orders.
+
+    These are the friction of the teeth, and the torques by which mesh forces act on gears whose deviations change.
+    """
+
+    loads: Complexes
+    """(n, size) generalized forces in the rotating frame, N and N m."""
+    motion: Complexes
+    """(n, size) motion under them."""
+    torque: float
+    """Mean torque of the drive that overcomes them, N m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,15 +110,15 @@ class Interface:
     """(m, f) torque of the drive per steady force, N m/N."""
     bearings: BearingMean | None
     """Nonlinear bearings in the averaged system."""
-    friction: FrictionResponse | None = None
-    """Response to the friction of the teeth, if the gearbox file requests it."""
+    loads: LoadResponse | None = None
+    """Response to loads beside the meshes' forces, if there are any."""
 
     @cached_property
     def static(self) -> Complexes:
-        """Readings (n, m, r) without forces of the meshes beyond the averaged system: static state and friction."""
+        """Readings (n, m, r) without forces of the meshes beyond the averaged system: static state and other loads."""
         found = np.zeros((len(self.frequencies), *self.ports.static.shape), dtype=complex)
-        if self.friction is not None:
-            found += self.read(self.friction.motion)
+        if self.loads is not None:
+            found += self.read(self.loads.motion)
         found[0] += self.ports.static
         return found
 
@@ -503,6 +519,16 @@ class HarmonicBalanceModel:
             self.lines, tuple(group_of(family, self.harmonics, forces, bases) for family in self._families)
         )
 
+    @cached_property
+    def slow_shifts(self) -> tuple[Integers, HarmonicCoupling]:
+        """Lines (q,) of the orders of shafts alone, and products of the meshes' deflections with signals of these."""
+        shafts = self.lines.index[:, len(self.base_names) - len(self.errors.shafts) :].any(axis=1)
+        alone = ~self.lines.index[:, : len(self.waves.base_orders)].any(axis=1)
+        lines = np.flatnonzero(shafts & alone)
+        multiples = self.lines.index[lines]
+        group = Group(0, len(self.waves.waves), np.concatenate([multiples, -multiples]))
+        return lines, HarmonicCoupling(self.lines, (group,))
+
     def coupled(self, spectra: Spectra, ports: MeshInterface, speed: float) -> list[Complexes]:
         """Functions of the mesh cycles, by their harmonics, as `coupling` takes them at a speed of the input."""
         return [coupled(self.waves, family, spectra, ports, speed, ports.forces.shape[1]) for family in self._families]
@@ -570,23 +596,33 @@ class HarmonicBalanceModel:
             torque=system.torque_at(speed),
             torque_per_force=still.reshape(shape),
             bearings=self._bearings_at(speed),
-            friction=self._friction_at(speed, pencil, frequencies),
+            loads=self._load_response_at(speed, pencil, frequencies),
         )
 
     @cached_property
-    def _friction_loads(self) -> Complexes:
-        """Generalized forces (3, n, size) of the friction of the teeth at the three speeds; none without friction."""
-        if self.waves.assembly.gearbox.case.damping.tooth_friction == 0.0:
+    def _loads_beside(self) -> Complexes:
+        """Generalized forces (3, n, size) at the three speeds of friction and of deviations; empty without either."""
+        has_friction = self.waves.assembly.gearbox.case.damping.tooth_friction != 0.0
+        if not (has_friction or self.errors.shafts):
             return np.zeros((0, 0, 0), dtype=complex)
-        speeds = (float(speed) for speed in self.system.speeds)
-        return np.array([tooth_friction(self.waves, self.lines, self.ports_at(w), w, self.harmonics) for w in speeds])
+        found = []
+        for speed in map(float, self.system.speeds):
+            ports = self.ports_at(speed)
+            static = self.waves.mean_stiffness * self.pressed(ports.static)
+            loads = self.errors.reactions(self.lines, self.waves, speed, static)
+            if has_friction:
+                loads = loads + tooth_friction(self.waves, self.lines, ports, speed, self.harmonics)
+            found.append(loads)
+        return np.array(found)
 
-    def _friction_at(self, speed: float, pencil: tuple[Floats, Floats], frequencies: Floats) -> FrictionResponse | None:
-        """Solve for the response to the friction of the teeth at a speed of the input, rad/s; None without friction."""
+    def _load_response_at(
+        self, speed: float, pencil: tuple[Floats, Floats], frequencies: Floats
+    ) -> LoadResponse | None:
+        """Solve for the response to these loads at a speed of the input, rad/s; None without any."""
         system = self.system
-        if not self._friction_loads.size:
+        if not self._loads_beside.size:
             return None
-        loads = system.at(self._friction_loads, speed)
+        loads = system.at(self._loads_beside, speed)
         motion = np.zeros(loads.shape, dtype=complex)
         still = system.still(pencil[0], loads[0].real[:, None])[:, 0]
         motion[0] = still[:-1]
@@ -595,7 +631,7 @@ class HarmonicBalanceModel:
         motion[acting] = np.linalg.solve(pencil[0] - w**2 * system.mass + 1j * w * pencil[1], loads[acting, :, None])[
             ..., 0
         ]
-        return FrictionResponse(loads, motion, float(still[-1]))
+        return LoadResponse(loads, motion, float(still[-1]))
 
     def _bearings_at(self, speed: float) -> BearingMean | None:
         """Nonlinear bearings in the averaged system at a speed of the input, rad/s; None without any."""

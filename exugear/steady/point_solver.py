@@ -35,10 +35,10 @@ from exugear.steady.nonlinear import (
 from exugear.steady.response import (
     Response,
     linear_response,
+    mean_wheel_error_forces,
     parametric_response,
     signals,
     transmission_errors,
-    wheel_error_forces,
 )
 from exugear.steady.settings import Method
 from exugear.steady.settling import SettlingRun, SettlingSegment, cannot_settle
@@ -148,8 +148,9 @@ class PointSolver:
     def forcing(self, interface: Interface) -> Complexes:
         """Find the forces of the meshes (lines, m, f) that vary in the static state, N, bearings being linear."""
         if not self.linear.loses_contact:
-            errors = transmission_errors(self.linear, interface.ports, interface.speed)
-            return errors + wheel_error_forces(self.linear, interface)
+            forces = transmission_errors(self.linear, interface.ports, interface.speed)
+            forces[..., DEFLECTION] += mean_wheel_error_forces(self.linear, interface)
+            return forces
         balance = HarmonicResidual(self.linear, interface, self.linear.sampling)
         return balance.forces(balance.static)[0]
 

@@ -23,13 +23,15 @@ import numpy as np
 from exugear.steady.excitation import HarmonicBalanceModel, Interface
 from exugear.steady.harmonics.linear_solvers import solve_lines
 from exugear.steady.harmonics.lines import add_answered, flat
-from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, MeshInterface, Spectra
+from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, POSITION, MeshInterface, Spectra
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.bundles import cached_bundle
 from fe_ste.tools.octets import SIZE
 
 TOLERANCE = 1e-9
 """Residual of the balance over the static deflections."""
+POSITIONS_REPEATED = 2
+"""Solutions after the first one, with positions in the mesh cycle that move with the orders of shafts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,27 +60,27 @@ class Response:
         """Coefficients (n, size) of the motion about the static state, in the rotating frame."""
         lines, size = self.interface.motion.shape[:2]
         found = self.interface.motion.reshape(lines, size, -1) @ self.excess.reshape(lines, -1, 1)
-        friction = self.interface.friction
-        if friction is None:
+        loads = self.interface.loads
+        if loads is None:
             return np.asarray(-found[..., 0])
-        return np.asarray(friction.motion - found[..., 0])
+        return np.asarray(loads.motion - found[..., 0])
 
     @property
     def torque(self) -> float:
         """Mean torque of the drive that keeps the speed, N m."""
         torque = self.interface.torque - float(np.sum(self.interface.torque_per_force * self.excess[0].real))
-        if self.interface.friction is None:
-            return torque
-        return torque + self.interface.friction.torque
+        return torque if self.interface.loads is None else torque + self.interface.loads.torque
 
 
 def linear_response(model: HarmonicBalanceModel, interface: Interface) -> Response:
     """Compute the response to static transmission errors as given displacements, first order in stiffness variation.
 
     F = -k_mean e with e = s - mean of s, the transmission error under the static force F_0; of a curve k_mean is the
-    mean of the tangent. Where the load shuttles by w, s contains w (g - g0), and F_0 w is a moment.
+    mean of the tangent. Deviations of gears add to e, and to the displacement of the damper. Where the load shuttles by
+    w, s contains w (g - g0), and F_0 w is a moment.
     """
-    excess = transmission_errors(model, interface.ports, interface.speed) + wheel_error_forces(model, interface)
+    excess = transmission_errors(model, interface.ports, interface.speed)
+    excess[..., DEFLECTION] += mean_wheel_error_forces(model, interface)
     deflection = interface.static[..., DEFLECTION] + _answer(interface, excess)[..., DEFLECTION]
     return _response(model, interface, deflection, excess, 0)
 
@@ -102,16 +104,50 @@ def transmission_errors(model: HarmonicBalanceModel, ports: MeshInterface, speed
     return found
 
 
+def mean_wheel_error_forces(model: HarmonicBalanceModel, interface: Interface) -> Complexes:
+    """Find the forces (n, m) of the deviations of gears in the averaged system, -k_mean e - c e', N."""
+    errors = model.errors.displacements(model.lines, model.waves, interface.speed)
+    waves = model.waves
+    return np.asarray(-(waves.mean_stiffness + 1j * interface.frequencies[:, None] * waves.damping) * errors)
+
+
 def wheel_error_forces(model: HarmonicBalanceModel, interface: Interface) -> Complexes:
     """Find the forces (n, m, f) of the deviations of gears, -k e - c e' with k over the mesh cycle, N and N m."""
     ports = interface.ports
     forces = np.zeros((len(model.lines.index), *ports.forces.shape[:2]), dtype=complex)
     if not model.errors.shafts:
         return forces
-    forces[..., DEFLECTION] = -model.errors.displacements(model.lines, model.waves, interface.speed)
-    damped = model.waves.damping * 1j * interface.frequencies[:, None] * forces[..., DEFLECTION]
-    forces = _products(model, model.cycle_tangents, ports, interface.speed, forces)
-    forces[..., DEFLECTION] += damped
+    errors = forces.copy()
+    errors[..., DEFLECTION] = model.errors.displacements(model.lines, model.waves, interface.speed)
+    forces[..., DEFLECTION] = mean_wheel_error_forces(model, interface)
+    beyond = _slopes_beyond_mean(model, interface)
+    return forces - model.coupling.of(beyond, errors.reshape(len(errors), -1)).reshape(forces.shape)
+
+
+def forces_of_positions(model: HarmonicBalanceModel, response: Response) -> Complexes:
+    """Find the forces (n, m, f) that meshes have because their positions in the cycle move with the shafts' orders, N.
+
+    A change p of the position changes the force by p dF/dpmc. It makes the sidebands of mesh orders that a frequency
+    modulation has.
+    """
+    ports = response.interface.ports
+    speed = response.interface.speed
+    waves = model.waves
+    shape = len(model.lines.index), *ports.forces.shape[:2]
+    derivative = 2j * np.pi * np.arange(model.harmonics + 1)
+    deflection = np.zeros(shape, dtype=complex)
+    deflection[..., DEFLECTION] = response.deflection - model.errors.displacements(model.lines, waves, speed)
+    slopes = {(DEFLECTION, DEFLECTION): derivative * model.cycle_coefficients}
+    changes = _products(model, slopes, ports, speed, deflection)
+    if waves.loads.any():
+        pulls = {(DEFLECTION, DEFLECTION): -derivative * model.cycle_pulls}
+        changes += _products(model, pulls, ports, speed, _everywhere(model, shape))
+    positions = response.motion @ ports.readings[: shape[1], POSITION].T
+    lines, coupling = model.slow_shifts
+    shifts = np.concatenate([positions[lines], positions[lines].conj()])
+    functions = [shifts[:, :, None] * np.eye(shape[1])]
+    forces = np.zeros(shape, dtype=complex)
+    forces[..., DEFLECTION] = coupling.of(functions, changes[..., DEFLECTION])
     return forces
 
 
@@ -136,9 +172,11 @@ def _products(
 
 
 def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Response:
-    """Response to stiffness that varies with the position in the mesh cycle, this moving with the mean speed alone.
+    """Response to stiffness that varies with the position in the mesh cycle, this moving with the mean speed.
 
-    The equations y = y_static - G (K y - given) of all lines are solved with readings as lengths, l y.
+    The equations y = y_static - G (K y - given) of all lines are solved with readings as lengths, l y. Where gears have
+    deviations, the position moves with the orders of their shafts, too: what that adds to the forces is given by the
+    solution before (`forces_of_positions`).
     """
     shape = len(model.lines.index), *interface.ports.forces.shape[:2]
     functions = _slopes_beyond_mean(model, interface)
@@ -158,12 +196,21 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
         add_answered(cached_bundle(coupling.terms), *parts, readings, *memory, octets, out)
         return out
 
-    given = (given_forces(model, interface) + wheel_error_forces(model, interface)).reshape(shape[0], -1)
-    start = -(answers @ given[..., None])[..., 0]
-    start += lengths * interface.static[..., : shape[2]].reshape(shape[0], -1)
-    found, products = solve_lines(apply, start, TOLERANCE)
-    excess = (given + coupling.of(scaled, found)).reshape(shape)
-    return _response(model, interface, (found / lengths).reshape(shape)[..., DEFLECTION], excess, products)
+    given = given_forces(model, interface) + wheel_error_forces(model, interface)
+    still = lengths * interface.static[..., : shape[2]].reshape(shape[0], -1)
+    moved = np.zeros_like(given)
+    found = None
+    products = 0
+    for _ in range(1 + (POSITIONS_REPEATED if model.errors.shafts else 0)):
+        whole = (given + moved).reshape(shape[0], -1)
+        start = still - (answers @ whole[..., None])[..., 0]
+        found, more = solve_lines(apply, start, TOLERANCE, found)
+        products += more
+        excess = (whole + coupling.of(scaled, found)).reshape(shape)
+        response = _response(model, interface, (found / lengths).reshape(shape)[..., DEFLECTION], excess, products)
+        if model.errors.shafts:
+            moved = forces_of_positions(model, response)
+    return response
 
 
 def _slopes_beyond_mean(model: HarmonicBalanceModel, interface: Interface) -> list[Complexes]:
@@ -261,6 +308,6 @@ def dissipated_and_given(model: HarmonicBalanceModel, response: Response) -> tup
     ports = interface.ports
     along = np.tensordot(rates, ports.forces, axes=(1, 2)) * model.weights[:, None]
     given = -2.0 * float(np.sum((response.excess[1:] * along.conj()).real))
-    if interface.friction is not None:
-        given += 2.0 * float(np.sum((interface.friction.loads[1:] * rates.conj()).real))
+    if interface.loads is not None:
+        given += 2.0 * float(np.sum((interface.loads.loads[1:] * rates.conj()).real))
     return taken, given

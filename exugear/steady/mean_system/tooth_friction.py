@@ -9,7 +9,6 @@ order of mu times the mesh stiffness, is neglected.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,18 +19,6 @@ from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.system.tooth_mesh.element import friction_lack
 from exugear.system.tooth_mesh.laws.friction import FRICTION_PARTS
 from fe_ste.tools.arrays import Complexes
-
-
-@dataclass(frozen=True, eq=False)
-class FrictionResponse:
-    """Response to friction at one speed; n orders."""
-
-    loads: Complexes
-    """(n, size) generalized forces of friction in the rotating frame, N and N m."""
-    motion: Complexes
-    """(n, size) motion under them."""
-    torque: float
-    """Mean torque of the drive that overcomes them, N m."""
 
 
 def tooth_friction(waves: MeshWaves, lines: LineSet, ports: MeshInterface, speed: float, harmonics: int) -> Complexes:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import tomllib
 
 import numpy as np
@@ -10,28 +9,19 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, POSITION
 from exugear.steady.nonlinear import HarmonicResidual
-from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.response import dissipated_and_given, signals
 from exugear.system.build import assemble
-from exugear.system.loads import LoadTable
-from exugear.system.modes import overall_row
 from exugear.system.tooth_mesh.element import MeshCurve
-from exugear.transient.compiled.solver import CompiledSystem
 
 from ..cases import gear_trains
 from ..cases import table as table_case
 from ..cases.assembled import assembled
 from ..cases.spur import SPUR_CASE
+from ..cases.steady_runs import apart, drive_of, fitted, run_from, solver_of
 
 SPUR = Gearbox.from_dict(tomllib.loads(SPUR_CASE))
-
-
-def solver_of(assembly, speeds, level, harmonics=10, combinations=3):
-    model = harmonic_balance_model(assembly, np.array(speeds), harmonics, combinations)
-    return PointSolver(model, level)
 
 
 def spur_stiffness():
@@ -46,107 +36,6 @@ def spur_surface():
     yield {"spur": table_case.surface_of(SPUR, "spur")}
     table_case.STIFFNESS.clear()
     table_case.STIFFNESS.update(before)
-
-
-def torque_of_vibration(system: MeanSystem, speed: float, frequencies: np.ndarray, motion: np.ndarray) -> float:
-    """Return the mean torque of the drive, N m, caused by a vibration in addition to that of the averaged system.
-
-    It is of second order in the vibration: bearing moments on tilting bodies do work along the kinematic rotation. A
-    time simulation without it gains or loses speed, 4e-5 per second at a lightly damped resonance of the GRC, which
-    shifts phases there by 1e-2.
-
-    Parameters
-    ----------
-    speed : of the input, rad/s
-    frequencies : (lines,) angular frequencies, rad/s
-    motion : (lines, size) coefficients about the static state, the mean first
-
-    Notes
-    -----
-    The mean power of all forces along the kinematic rotation has to vanish. Meshes contribute none: the rotation does
-    not deflect them. Products of two different orders have zero mean, so each relevant order is evaluated alone.
-    """
-    frame = system.frame
-    assembly = system.frame.assembly
-    load = assembly.torque_vector(assembly.gearbox.case.static_load.torques_N_m)
-    here = system.static_at(speed) + motion[0].real
-
-    def power(change: np.ndarray, frequency: float) -> float:
-        parts = change, 1j * frequency * change, -(frequency**2) * change
-        place, rate, bend = (np.asarray(part.real) for part in parts)
-        q, v, a = frame.state(0.0, speed, here + place, rate, bend)
-        missing = assembly.inertia_forces(q, v, a) - assembly.forces(q, v, frame.mean_meshes) - load
-        return float(assembly.rolling_velocity(q, frame.speeds) @ missing)
-
-    energies = frequencies**2 * (np.abs(motion) ** 2 @ np.abs(np.diag(system.mass)))
-    energies[0] = 0.0
-    still = power(np.zeros(system.size, dtype=complex), 0.0)
-    total = 0.0
-    for line in np.flatnonzero(energies > 1e-6 * energies.sum()):
-        for part in math.sqrt(2.0) * motion[line] * np.array([[1.0], [-1.0], [1j], [-1j]]):
-            total += 0.5 * (power(part, float(frequencies[line])) - still)
-    rolling = assembly.rolling_velocity(np.zeros(assembly.size), frame.speeds)
-    return total / float(rolling @ system.drive)
-
-
-def drive_of(model, response):
-    """Torque that keeps the speed, what the vibration takes of it included."""
-    own = response.interface
-    return response.torque + torque_of_vibration(model.system, own.speed, own.frequencies, response.motion)
-
-
-def run_from(model, response, duration, step, torque):
-    """Instants, overall transmission error and angle of the input of a run in time that starts on a response."""
-    interface = response.interface
-    system, assembly, motion = model.system, model.waves.assembly, response.motion
-    w = interface.frequencies[1:, None]
-    u = system.static_at(interface.speed) + motion[0].real + 2.0 * motion[1:].sum(axis=0).real
-    q, v, _ = system.frame.state(0.0, interface.speed, u, 2.0 * (1j * w * motion[1:]).sum(axis=0).real)
-    load = assembly.gearbox.case.static_load
-    run = CompiledSystem(assembly, q, v, LoadTable({**load.torques_N_m, load.locked[0]: torque}), step)
-    steps, every = round(duration / step), 8
-    time, overall, angle = [], [], []
-    for first in range(0, steps, 8000):
-        states = np.empty((8000, assembly.size))
-        assert run.advance(first, states, np.empty_like(states)) == 8000
-        time.append(step * (first + np.arange(every, 8001, every)))
-        overall.append(states[every - 1 :: every] @ overall_row(assembly))
-        angle.append(states[every - 1 :: every, system.pinned])
-    return tuple(np.concatenate(values) for values in (time, overall, angle))
-
-
-def fitted(solver, response, duration, step, last):
-    """Mean speed of a run in time that starts on a response, and lines of its overall transmission error.
-
-    A line above half the rate at which the run is read appears as another one below it, which may be one of the
-    others: those that hardly are there are left at zero.
-    """
-    model = solver.model
-    time, overall, angle = run_from(model, response, duration, step, drive_of(model, response))
-    late = time > duration - last
-    speed, start = np.polyfit(time[late], angle[late], 1)
-    half_rate = np.pi / (time[1] - time[0])
-    size = abs(signals(model, response)[:, 0])
-    size[0] = np.inf
-    seen = np.flatnonzero((abs(speed * model.lines.orders) < half_rate) | (size > 1e-6 * size[1:].max()))
-    angles = np.outer(np.copysign(1.0, speed) * (speed * time[late] + start), model.lines.orders[seen])
-    columns = np.hstack([np.cos(angles), -np.sin(angles[:, 1:])])
-    found = np.linalg.lstsq(columns, overall[late], rcond=None)[0]
-    lines = np.zeros(len(model.lines.orders), dtype=complex)
-    lines[seen[1:]] = found[1 : len(seen)] + 1j * found[len(seen) :]
-    return float(speed), lines[1:]
-
-
-def apart(solver, speed, duration, step, last):
-    """Differences of lines and of their amplitudes between response and run, over the size of all lines.
-
-    The run keeps its mean speed to some 1e-7, which at a resonance turns phases by 1e-4: the response is solved again
-    at the speed that the run has.
-    """
-    measured, lines = fitted(solver, solver.response(speed), duration, step, last)
-    known = 2.0 * signals(solver.model, solver.response(measured))[1:, 0]
-    size = np.linalg.norm(known)
-    return np.linalg.norm(lines - known) / size, np.linalg.norm(abs(lines) - abs(known)) / size
 
 
 @pytest.mark.parametrize("speed", [60.0, 100.0])
