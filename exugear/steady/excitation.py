@@ -21,7 +21,7 @@ from exugear.steady.harmonics.lines import (
     line_set,
     modulated,
     rank1_lattice,
-    with_shafts,
+    with_rotations,
 )
 from exugear.steady.mean_system.bearing_waves import (
     TILTS,
@@ -353,12 +353,13 @@ class HarmonicBalanceModel:
         lines = line_set(waves.base_orders.tolist(), reach.harmonics, reach.combinations)
         modulators = [planets for _, planets in waves.carriers]
         lines = beside(lines, modulators, 0) if waves.passing else modulated(lines, modulators)
-        return with_shafts(lines, self.errors.shafts, len(waves.base_orders), reach.harmonics)
+        errors = self.errors
+        return with_rotations(lines, errors.rotations, errors.sidebands, len(waves.base_orders), reach.harmonics)
 
     @cached_property
     def without_errors(self) -> HarmonicBalanceModel:
         """The same gearbox with gears that have no deviations; itself if they have none."""
-        if not self.errors.shafts:
+        if not self.errors.sidebands:
             return self
         return HarmonicBalanceModel(self.waves, self.usual_harmonics, self._usual.combinations // 2)
 
@@ -435,7 +436,7 @@ class HarmonicBalanceModel:
 
     @property
     def base_names(self) -> tuple[str, ...]:
-        """Names of all bases: meshes, carriers whose planets mesh out of phase, and shafts of gears with deviations."""
+        """Names of all bases: meshes, carriers of planets out of phase, rotations of gears with deviations."""
         return (*self.waves.base_names, *(name for name, _ in self.waves.carriers), *self.errors.names)
 
     @property
@@ -522,9 +523,9 @@ class HarmonicBalanceModel:
     @cached_property
     def slow_shifts(self) -> tuple[Integers, HarmonicCoupling]:
         """Lines (q,) of the orders of shafts alone, and products of the meshes' deflections with signals of these."""
-        shafts = self.lines.index[:, len(self.base_names) - len(self.errors.shafts) :].any(axis=1)
-        alone = ~self.lines.index[:, : len(self.waves.base_orders)].any(axis=1)
-        lines = np.flatnonzero(shafts & alone)
+        meshes = len(self.waves.base_orders)
+        slow = ~self.lines.index[:, :meshes].any(axis=1) & self.lines.index[:, meshes:].any(axis=1)
+        lines = np.flatnonzero(slow)
         multiples = self.lines.index[lines]
         group = Group(0, len(self.waves.waves), np.concatenate([multiples, -multiples]))
         return lines, HarmonicCoupling(self.lines, (group,))
@@ -603,17 +604,30 @@ class HarmonicBalanceModel:
     def _loads_beside(self) -> Complexes:
         """Generalized forces (3, n, size) at the three speeds of friction and of deviations; empty without either."""
         has_friction = self.waves.assembly.gearbox.case.damping.tooth_friction != 0.0
-        if not (has_friction or self.errors.shafts):
+        if not (has_friction or self.errors.sidebands):
             return np.zeros((0, 0, 0), dtype=complex)
+        meshes = len(self.waves.base_orders)
         found = []
         for speed in map(float, self.system.speeds):
-            ports = self.ports_at(speed)
-            static = self.waves.mean_stiffness * self.pressed(ports.static)
-            loads = self.errors.reactions(self.lines, self.waves, speed, static)
+            loads = np.zeros((len(self.lines.index), self.system.size), dtype=complex)
+            if self.errors.sidebands:
+                loads += self.errors.at_lines(self.errors.reaction, self.lines, meshes, speed)
             if has_friction:
-                loads = loads + tooth_friction(self.waves, self.lines, ports, speed, self.harmonics)
+                loads += tooth_friction(self.waves, self.lines, self.ports_at(speed), speed, self.harmonics)
             found.append(loads)
         return np.array(found)
+
+    @cached_property
+    def _displacements(self) -> Complexes:
+        """Deviations (n, m) of gears and pins at the lines where the input turns about +z, m."""
+        waves = self.waves
+        if not self.errors.sidebands:
+            return np.zeros((len(self.lines.index), len(waves.waves)), dtype=complex)
+        return self.errors.at_lines(self.errors.displacement, self.lines, len(waves.base_orders), 1.0)
+
+    def wheel_displacements(self, speed: float) -> Complexes:
+        """Deviations (n, m) of gears and pins in the meshes at the lines, at a speed of the input (rad/s), m."""
+        return self._displacements if speed > 0.0 else self._displacements.conj()
 
     def _load_response_at(
         self, speed: float, pencil: tuple[Floats, Floats], frequencies: Floats

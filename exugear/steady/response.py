@@ -106,7 +106,7 @@ def transmission_errors(model: HarmonicBalanceModel, ports: MeshInterface, speed
 
 def mean_wheel_error_forces(model: HarmonicBalanceModel, interface: Interface) -> Complexes:
     """Find the forces (n, m) of the deviations of gears in the averaged system, -k_mean e - c e', N."""
-    errors = model.errors.displacements(model.lines, model.waves, interface.speed)
+    errors = model.wheel_displacements(interface.speed)
     waves = model.waves
     return np.asarray(-(waves.mean_stiffness + 1j * interface.frequencies[:, None] * waves.damping) * errors)
 
@@ -115,10 +115,10 @@ def wheel_error_forces(model: HarmonicBalanceModel, interface: Interface) -> Com
     """Find the forces (n, m, f) of the deviations of gears, -k e - c e' with k over the mesh cycle, N and N m."""
     ports = interface.ports
     forces = np.zeros((len(model.lines.index), *ports.forces.shape[:2]), dtype=complex)
-    if not model.errors.shafts:
+    if not model.errors.sidebands:
         return forces
     errors = forces.copy()
-    errors[..., DEFLECTION] = model.errors.displacements(model.lines, model.waves, interface.speed)
+    errors[..., DEFLECTION] = model.wheel_displacements(interface.speed)
     forces[..., DEFLECTION] = mean_wheel_error_forces(model, interface)
     beyond = _slopes_beyond_mean(model, interface)
     return forces - model.coupling.of(beyond, errors.reshape(len(errors), -1)).reshape(forces.shape)
@@ -136,7 +136,7 @@ def forces_of_positions(model: HarmonicBalanceModel, response: Response) -> Comp
     shape = len(model.lines.index), *ports.forces.shape[:2]
     derivative = 2j * np.pi * np.arange(model.harmonics + 1)
     deflection = np.zeros(shape, dtype=complex)
-    deflection[..., DEFLECTION] = response.deflection - model.errors.displacements(model.lines, waves, speed)
+    deflection[..., DEFLECTION] = response.deflection - model.wheel_displacements(speed)
     slopes = {(DEFLECTION, DEFLECTION): derivative * model.cycle_coefficients}
     changes = _products(model, slopes, ports, speed, deflection)
     if waves.loads.any():
@@ -145,7 +145,13 @@ def forces_of_positions(model: HarmonicBalanceModel, response: Response) -> Comp
     positions = response.motion @ ports.readings[: shape[1], POSITION].T
     lines, coupling = model.slow_shifts
     shifts = np.concatenate([positions[lines], positions[lines].conj()])
-    functions = [shifts[:, :, None] * np.eye(shape[1])]
+    # What two signals of a family of planets multiply to: each wave by the mean of the other.
+    mean = [next(n for n, own in enumerate(waves.waves) if own.first == wave.first) for wave in waves.waves]
+    products = np.zeros((len(shifts), shape[1], shape[1]), dtype=complex)
+    for n, at in enumerate(mean):
+        products[:, n, n] = shifts[:, at]
+        products[:, n, at] = shifts[:, n]
+    functions = [products]
     forces = np.zeros(shape, dtype=complex)
     forces[..., DEFLECTION] = coupling.of(functions, changes[..., DEFLECTION])
     return forces
@@ -201,14 +207,14 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
     moved = np.zeros_like(given)
     found = None
     products = 0
-    for _ in range(1 + (POSITIONS_REPEATED if model.errors.shafts else 0)):
+    for _ in range(1 + (POSITIONS_REPEATED if model.errors.sidebands else 0)):
         whole = (given + moved).reshape(shape[0], -1)
         start = still - (answers @ whole[..., None])[..., 0]
         found, more = solve_lines(apply, start, TOLERANCE, found)
         products += more
         excess = (whole + coupling.of(scaled, found)).reshape(shape)
         response = _response(model, interface, (found / lengths).reshape(shape)[..., DEFLECTION], excess, products)
-        if model.errors.shafts:
+        if model.errors.sidebands:
             moved = forces_of_positions(model, response)
     return response
 
@@ -279,8 +285,8 @@ def signals(model: HarmonicBalanceModel, response: Response) -> Complexes:
     if levers.any():
         deflection = deflection + response.motion @ levers[:, :-1].T
         deflection[0] += levers[:, -1]
-    if model.errors.shafts:
-        deflection = deflection - model.errors.displacements(model.lines, model.waves, interface.speed)
+    if model.errors.sidebands:
+        deflection = deflection - model.wheel_displacements(interface.speed)
     found = [of_motion, deflection, response.force]
     if model.radiated is not None:
         # A line of a coefficient c oscillates with the amplitude 2 c.

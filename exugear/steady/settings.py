@@ -173,12 +173,12 @@ def check_deviations(gearbox: Gearbox, method: Method) -> None:
     Raises
     ------
     SteadyError
-        The gearbox file has deviations, and the method is ``nonlinear``.
+        The gearbox file has deviations or displaced pins, and the method is ``nonlinear``.
     """
-    if gearbox.deviations and method == "nonlinear":
+    if (gearbox.deviations or gearbox.pin_offsets) and method == "nonlinear":
         raise SteadyError(
-            "deviations: the method nonlinear does not include the orders of the shafts; use --method parametric with "
-            "--mesh-model line_of_action, or exugear run"
+            "deviations, pins: the method nonlinear does not include the orders of the shafts; use --method "
+            "parametric with --mesh-model line_of_action, or exugear run"
         )
 
 

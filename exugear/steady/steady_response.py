@@ -337,7 +337,7 @@ def response_of(
         input_hash=settings.hash_with(assembly),
         lines=model.lines,
         base_names=model.base_names,
-        shafts=len(model.errors.shafts),
+        shafts=len(model.errors.rotations),
         wave_names=tuple(wave.name for wave in model.waves.waves),
         signals=model.signal_names,
         bearing_names=solver.model.bearing_names,

@@ -85,8 +85,11 @@ class LineSet(ReprMixin, line=": {index!n} lines of {index.shape[1]} bases"):
     @cached_property
     def _radix(self) -> Integers:
         """Weights that make one number of a vector of multiples; wide enough for sums of several lines."""
-        span = 64 * (int(np.abs(self.index @ self.units).max(initial=0)) + 1)
-        return np.array([span**n for n in range(self.units.shape[1])], dtype=np.int64)
+        spans = [64 * (int(highest) + 1) for highest in np.abs(self.index @ self.units).max(axis=0)]
+        weights = [math.prod(spans[:n]) for n in range(len(spans))]
+        if math.prod(spans) >= 2**63:
+            raise OverflowError(f"{len(self.index)} orders of {len(self.bases)} frequencies are too many to number")
+        return np.array(weights, dtype=np.int64)
 
     @cached_property
     def _sorted_keys(self) -> tuple[Integers, Integers]:
@@ -246,53 +249,59 @@ def beside(lines: LineSet, slow: Sequence[Modulator], most: int) -> LineSet:
 
 
 @dataclass(frozen=True)
-class ShaftOrders:
-    """Orders of a shaft whose gears deviate from tooth to tooth."""
+class Rotation:
+    """Rotation of a shaft whose gears deviate from tooth to tooth, or of a carrier."""
 
     name: str
     order: float
-    """Its frequency of rotation over that of the reference."""
-    orders: tuple[int, ...]
-    """Multiples of its rotation."""
-    bases: tuple[int, ...]
-    """Bases of the meshes of its gears, each a whole multiple of the rotation: the number of teeth."""
+    """Its frequency over that of the reference."""
 
 
-def with_shafts(lines: LineSet, shafts: Sequence[ShaftOrders], meshes: int, harmonics: int) -> LineSet:
-    """Return lines with the orders of shafts by themselves and beside the harmonics of their meshes; shafts come last.
+@dataclass(frozen=True)
+class Sidebands:
+    """Multiples of slow rotations, by themselves and beside the harmonics of a mesh frequency."""
+
+    multiples: tuple[int, ...]
+    """Of all bases that follow those of the meshes."""
+    base: int
+    """Base of the mesh frequency."""
+
+
+def with_rotations(
+    lines: LineSet, rotations: Sequence[Rotation], sidebands: Sequence[Sidebands], meshes: int, harmonics: int
+) -> LineSet:
+    """Return lines with the orders of rotations, whose bases come last.
 
     Parameters
     ----------
-    meshes : number of the lines' bases that are meshes; slow rotations follow them
+    meshes : number of the lines' bases that are meshes; other slow rotations follow them
     harmonics : of each mesh frequency whose sidebands are included
 
     Examples
     --------
     A pinion with five teeth whose first order matters:
 
-    >>> lines = with_shafts(line_set([5.0], 1), [ShaftOrders("pinion", 1.0, (1,), (0,))], 1, 1)
+    >>> lines = with_rotations(line_set([5.0], 1), [Rotation("pinion", 1.0)], [Sidebands((1,), 0)], 1, 1)
     >>> [tuple(row) for row in lines.index.tolist()], lines.orders.tolist()
     ([(0, 0), (0, 1), (1, -1), (1, 0), (1, 1)], [0.0, 1.0, 4.0, 5.0, 6.0])
     """
-    if not shafts:
+    if not sidebands:
         return lines
     first = len(lines.bases)
-    bases = np.append(lines.bases, [shaft.order for shaft in shafts])
-    rows = np.hstack([lines.index, np.zeros((len(lines.index), len(shafts)), dtype=np.int64)])
-    more = []
-    for place, shaft in enumerate(shafts):
-        for order, base in itertools.product(shaft.orders, shaft.bases):
-            for harmonic in range(-harmonics, harmonics + 1):
-                row = np.zeros(len(bases), dtype=np.int64)
-                row[first + place], row[base] = order, harmonic
-                more.append(row)
-    # Shafts lead the search for common frequencies: meshes are whole multiples of their rotation, however many teeth.
+    bases = np.append(lines.bases, [rotation.order for rotation in rotations])
+    rows = np.zeros((len(lines.index) + len(sidebands) * (2 * harmonics + 1), len(bases)), dtype=np.int64)
+    rows[: len(lines.index), :first] = lines.index
+    more = rows[len(lines.index) :].reshape(len(sidebands), 2 * harmonics + 1, -1)
+    for own, beside_mesh in zip(more, sidebands, strict=True):
+        own[:, meshes:] = beside_mesh.multiples
+        own[:, beside_mesh.base] = np.arange(-harmonics, harmonics + 1)
+    # Rotations lead the search for common frequencies: meshes are whole multiples of them, however many teeth.
     lead = [*range(first, len(bases)), *range(meshes)]
     shared = _independent(bases[lead], whole=MOST_TEETH)
     units = np.zeros((len(bases), shared.shape[1] + first - meshes), dtype=np.int64)
     units[lead, : shared.shape[1]] = shared
     units[meshes:first, shared.shape[1] :] = np.eye(first - meshes, dtype=np.int64)
-    return _lines_of_rows(np.vstack([rows, *more]), bases, units)
+    return _lines_of_rows(rows, bases, units)
 
 
 def joined(one: LineSet, other: LineSet) -> LineSet:

@@ -250,21 +250,6 @@ def _has_sectors(gearbox: Gearbox, mesh: Mesh) -> bool:
     return seat is not None and seat.sectors is not None
 
 
-def deviation_lack(gearbox: Gearbox) -> str:
-    """Return which gear's deviations cannot be part of a steady-state response; empty if all can."""
-    carried = {body.name for body in gearbox.bodies() if body.carrier is not None}
-    for mesh in gearbox.meshes:
-        if not {mesh.pinion, mesh.gear} & carried:
-            continue
-        for body, gear in ((mesh.pinion, mesh.pair.pinion.name), (mesh.gear, mesh.pair.gear.name)):
-            if (body, gear) in gearbox.deviations:
-                return (
-                    f"deviations of gear {gear!r} on body {body!r}: it meshes with planets, which the steady-state "
-                    "response does not include; remove them, or use exugear run"
-                )
-    return ""
-
-
 def _check(assembly: Assembly) -> None:
     """Refuse what has no constant matrices, or no single speed."""
     gearbox = assembly.gearbox
@@ -277,12 +262,10 @@ def _check(assembly: Assembly) -> None:
         raise SteadyError("the gear train has no meshes and no excitation; use exugear run instead")
     if assembly.travelling.first.size:
         raise SteadyError(ELASTIC_RING)
-    if lacking := deviation_lack(gearbox):
-        raise SteadyError(lacking)
-    if gearbox.pin_offsets:
+    if gearbox.pin_offsets and not assembly.variant.has_bearings:
         raise SteadyError(
-            "pins: position errors cause unequal planet loads that rotate with the carrier, which the steady-state "
-            "response cannot treat; remove them, or use exugear run"
+            "pins: on ideal joints a displaced pin would carry a planet out of its meshes; use a variant with "
+            "bearings, or exugear run"
         )
     # Rows of rolling elements must neither pass nor turn against the load that they carry.
     rolling = assembly.connectors.rolling

@@ -1,175 +1,260 @@
-"""Pitch deviations and run-out of gears: displacements known over the revolution of their shafts.
+"""Pitch deviations and run-out of gears, and displaced planet pins: known displacements at the orders of shafts.
 
 A deviation e of a gear is subtracted from the deflection d of its meshes, so that the force of a mesh is
 
     F = k (d - e) + c (d' - e'),
 
-and -k e - c e' is a given force at the orders of the shaft. The stiffness k varies with the mesh cycle, which brings
-the sidebands h z +- n of the mesh orders h z for each order n of a shaft with z teeth.
+and -k e - c e' is a given force at the orders n of the shaft. The stiffness k varies with the mesh cycle, which brings
+the sidebands h z +- n of the mesh orders h z of a gear with z teeth. The normal of a flank with deviations is not that
+of the perfect one: by the work along e, the static force F_0 has the torque F_0 de/dphi on the gear, which is given,
+too. The averaged system itself has no deviations.
 
-The normal of a deviating flank is not that of the perfect one: by the work along e, the static force F_0 has the torque
-F_0 de/dphi on the gear, which is given, too. The averaged system itself has no deviations.
+Meshes of planets are waves around the carrier (`exugear.steady.mean_system.mesh_waves`), so that a deviation of order n
+against the carrier appears at n plus and minus multiples of the carrier's rotation. A pin out of place by o displaces
+its planet, whose coordinates count from there: the meshes of the planet have the constant deviation -g o with the
+gradient g of their deflection.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from exugear.steady.harmonics.lines import LineSet, ShaftOrders, fourier_coefficients, largest
+from exugear.steady.harmonics.lines import SAME, LineSet, Rotation, Sidebands, fourier_coefficients, largest
 from exugear.steady.mean_system.mesh_waves import MeshWaves
+from exugear.steady.mean_system.rotating_frame import PlanetSet
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.system.kernels.meshes import FRAME
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Complexes, Floats, Integers
 
 NEGLECTED = 1e-2
-"""Share of a deviation's root mean square in orders that are left out."""
+"""Share of the root mean square of a mesh component's deviations in orders that are left out."""
 SAMPLES_PER_PIECE = 4
 """Samples of each cubic piece of a deviation for its Fourier coefficients; pieces are a fraction of a tooth."""
-
-
-@dataclass(frozen=True, eq=False)
-class WheelError:
-    """Deviation of one gear in one of its meshes."""
-
-    wave: int
-    """Its mesh, by its place among the mesh components."""
-    shaft: int
-    """Place of its shaft in `WheelErrors.shafts`."""
-    harmonics: Complexes
-    """(h + 1,) Fourier coefficients over the shaft's angle at zero angle of the input, m along the mesh's row."""
-    angles: tuple[int, int]
-    """Coordinates of the gear's rotation and of its frame's, -1 for none: their static values add to the angle."""
-    sense: float
-    """1 where the gear turns about +z relative to its frame when the input does, else -1."""
+LEAST = 1e-9
+"""Share of the largest coefficient below which one is zero but for round-off."""
 
 
 @dataclass(frozen=True, eq=False)
 class WheelErrors:
-    """Deviations of all gears; without any, it is empty."""
+    """Deviations of all gears and pins as Fourier series of the angles of some rotations; without any, it is empty.
 
-    shafts: tuple[ShaftOrders, ...] = ()
-    errors: tuple[WheelError, ...] = ()
+    Values hold where the input turns about +z; where it turns about -z, they are the conjugates.
+    """
+
+    rotations: tuple[Rotation, ...] = ()
+    """Bases that follow those of meshes and of carriers whose planets mesh out of phase."""
+    sidebands: tuple[Sidebands, ...] = ()
+    """Lines that matter."""
+    multiples: Integers = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int64))
+    """(t, b) multiples of the bases behind those of the meshes."""
+    displacement: Complexes = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
+    """(t, m) deviations of the mesh components, m."""
+    reaction: Complexes = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
+    """(t, size) generalized forces in the rotating frame by the static forces on the deviations, N and N m."""
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the bases of the shafts' orders."""
-        return tuple(shaft.name for shaft in self.shafts)
+        """Names of the rotations."""
+        return tuple(rotation.name for rotation in self.rotations)
 
-    def displacements(self, lines: LineSet, waves: MeshWaves, speed: float) -> Complexes:
-        """Deviations (n, m) of the meshes at the lines, at a speed of the input (rad/s), m."""
-        found = np.zeros((len(lines.index), len(waves.waves)), dtype=complex)
-        for error in self.errors:
-            place, values = self._at_lines(error, error.harmonics, lines, waves, speed)
-            np.add.at(found[:, error.wave], place, values)
-        return found
-
-    def reactions(self, lines: LineSet, waves: MeshWaves, speed: float, static: Floats) -> Complexes:
-        """Generalized forces (n, size) in the frame of static mesh forces (m,) on gears that deviate, N and N m."""
-        rotation = waves.system.frame.matrices(0.0)[0]
-        found = np.zeros((len(lines.index), len(rotation.T)), dtype=complex)
-        for error in self.errors:
-            slopes = 1j * np.arange(len(error.harmonics)) * error.harmonics
-            place, values = self._at_lines(error, static[error.wave] * slopes, lines, waves, speed)
-            row = sum(sign * rotation[at] for at, sign in zip(error.angles, (1.0, -1.0), strict=True) if at >= 0)
-            np.add.at(found, place, values[:, None] * row)
-        return found
-
-    def _at_lines(
-        self, error: WheelError, harmonics: Complexes, lines: LineSet, waves: MeshWaves, speed: float
-    ) -> tuple[Integers, Complexes]:
-        """Place (h,) and coefficient of each harmonic of a function of the gear's angle that is among the lines."""
-        static = waves.system.frame.matrices(0.0)[0] @ waves.system.static_at(speed)
-        spin, frame = (float(static[at]) if at >= 0 else 0.0 for at in error.angles)
-        order = np.arange(len(harmonics))
-        values = harmonics * np.exp(1j * order * (spin - frame))
-        if error.sense * speed < 0.0:
-            values = values.conj()
-        multiples = np.zeros((len(order), lines.index.shape[1]), dtype=np.int64)
-        multiples[:, lines.index.shape[1] - len(self.shafts) + error.shaft] = order
+    def at_lines(self, values: Complexes, lines: LineSet, meshes: int, speed: float) -> Complexes:
+        """Coefficients (n, ...) of a Fourier series (t, ...) at lines, of which `meshes` bases are meshes."""
+        found = np.zeros((len(lines.index), *values.shape[1:]), dtype=complex)
+        if not len(values):
+            return found
+        multiples = np.zeros((len(values), lines.index.shape[1]), dtype=np.int64)
+        multiples[:, meshes:] = self.multiples
         place, mirrored = lines.find(multiples)
+        values = values if speed > 0.0 else values.conj()
         there = place >= 0
-        return place[there], np.where(mirrored, values.conj(), values)[there]
+        turned = np.where(mirrored[:, None], values.conj(), values)
+        np.add.at(found, place[there], turned[there])
+        return found
 
 
 def without_wheel_errors(assembly: Assembly) -> Assembly:
-    """Return an assembly whose gears have no deviations."""
+    """Return an assembly whose gears have no deviations and whose planet pins are in place."""
     none = (np.zeros(0), np.zeros(0))
     elements = tuple(replace(element, errors=none) for element in assembly.elements)
-    meshes = assembly.meshes
-    no_pieces = np.zeros_like(meshes.error_pieces)
-    return replace(assembly, elements=elements, meshes=meshes._replace(error_pieces=no_pieces))
+    no_pieces = np.zeros_like(assembly.meshes.error_pieces)
+    local = assembly.connectors.local.copy()
+    for n, bearing in enumerate(assembly.supports):
+        local[n, 0, :2] -= assembly.gearbox.pin_offsets.get(bearing.body, (0.0, 0.0))
+    return replace(
+        assembly,
+        elements=elements,
+        meshes=assembly.meshes._replace(error_pieces=no_pieces),
+        connectors=assembly.connectors._replace(local=local),
+    )
 
 
 def wheel_errors(assembly: Assembly, waves: MeshWaves) -> WheelErrors:
-    """Find the deviations of an assembly's gears, and the orders of their shafts that matter.
+    """Find the deviations of an assembly's gears and pins, and the orders that matter.
 
     Parameters
     ----------
     assembly : with deviations
     waves : mesh components of its averaged system without deviations
     """
-    meshes = assembly.meshes
-    frame = waves.system.frame
-    names: list[str] = []
-    errors: list[WheelError] = []
-    teeth: list[list[tuple[int, int]]] = []
-    for n, wave in enumerate(waves.waves):
-        mesh = assembly.elements[wave.first].mesh
-        for end, (body, gear) in enumerate(((mesh.pinion, mesh.pair.pinion), (mesh.gear, mesh.pair.gear))):
-            pieces = int(meshes.error_pieces[wave.first, end])
-            if not pieces:
-                continue
-            relative = frame.speeds.get(body, 0.0) - frame.speeds.get(mesh.frame, 0.0)
-            if body not in names:
-                names.append(body)
-                teeth.append([])
-            shaft = names.index(body)
-            teeth[shaft].append((wave.base, gear.teeth))
-            index = meshes.coordinates[wave.first]
-            errors.append(
-                WheelError(
-                    wave=n,
-                    shaft=shaft,
-                    harmonics=_harmonics(meshes.error[wave.first, end, :pieces]),
-                    angles=(int(index[BODY_SIZE * end + SPIN]), int(index[FRAME])),
-                    sense=math.copysign(1.0, relative),
-                )
-            )
-    shafts = []
-    for shaft, name in enumerate(names):
-        base, count = teeth[shaft][0]
-        orders: set[int] = set()
-        for error in errors:
-            if error.shaft == shaft:
-                number = next(z for b, z in teeth[shaft] if b == waves.waves[error.wave].base)
-                orders |= _orders_of(error.harmonics, number)
-        shafts.append(
-            ShaftOrders(
-                name=f"rotation of {name}",
-                order=float(waves.base_orders[base]) / count,
-                orders=tuple(sorted(orders)),
-                bases=tuple(dict.fromkeys(base for base, _ in teeth[shaft])),
-            )
+    series = _Series(assembly, waves)
+    for meshes, planets in waves.groups:
+        series.add_family(meshes, planets)
+    return series.found()
+
+
+Key = tuple[tuple[str, int], ...]
+"""Multiples of rotations by their names, without zeros."""
+
+
+class _Series:
+    """Collects the terms of all families of meshes."""
+
+    def __init__(self, assembly: Assembly, waves: MeshWaves) -> None:
+        self.assembly = assembly
+        self.waves = waves
+        self.frame = waves.system.frame
+        speed = float(waves.system.speeds[1])
+        self.still = self.frame.matrices(0.0)[0] @ waves.system.static_at(speed)
+        self.load = waves.mean_stiffness * (waves.values(assembly.meshes.deflection, speed) - waves.rest)
+        self.orders = {name: modulator.order for name, modulator in waves.carriers}
+        """Order of each rotation, by its name; those of carriers whose planets mesh out of phase come first."""
+        self.displacement: dict[Key, Complexes] = {}
+        self.reaction: dict[Key, Complexes] = {}
+        self.beside: list[tuple[Key, int]] = []
+        """Rotations, and the base of the mesh beside whose harmonics they appear."""
+
+    def add_family(self, meshes: tuple[int, ...], planets: PlanetSet | None) -> None:
+        """Add the deviations of all meshes of a family of planets, or of a single mesh."""
+        waves = self.waves.waves
+        own = [n for n, wave in enumerate(waves) if wave.first == meshes[0]]
+        sizes: dict[Key, float] = {}
+        for place, mesh in enumerate(meshes):
+            for end in range(2):
+                orders = self._orders(mesh, end)
+                if not orders:
+                    continue
+                teeth = self._wheel(mesh, end)[1]
+                turning = self._turning(mesh, end, planets, place, len(own))
+                for (order, value), (turn, shape, row) in itertools.product(orders, turning):
+                    if order == 0 and turn < 0:
+                        continue  # the conjugate of that which turns the other way
+                    key = self._key(mesh, end, planets, order, turn)
+                    # A term at rest counts with its conjugate.
+                    whole = (lambda x: 2.0 * x.real) if not key and (order or turn) else (lambda x: x)
+                    displaced = np.zeros(len(waves), dtype=complex)
+                    displaced[own] = whole(value * shape)
+                    self._add(self.displacement, key, displaced)
+                    self._add(self.reaction, key, whole(1j * order * value * self.load[own[0]] * row))
+                    # Orders at the same distance from a mesh order are sidebands of one kind.
+                    nearest = self._key(mesh, end, planets, order - teeth * round(order / teeth), turn)
+                    sizes[nearest] = math.hypot(sizes.get(nearest, 0.0), float(np.linalg.norm(displaced)))
+        sizes.pop((), None)
+        if sizes:
+            size = np.array(list(sizes.values()))
+            kept = largest(size, NEGLECTED * float(np.linalg.norm(size))) & (size > 0.0)
+            self.beside += [(key, waves[own[0]].base) for key, is_kept in zip(sizes, kept, strict=True) if is_kept]
+
+    def found(self) -> WheelErrors:
+        """Return what was collected."""
+        names = list(self.orders)
+        carriers = len(self.waves.carriers)
+
+        def row(key: Key) -> tuple[int, ...]:
+            multiples = dict(key)
+            return tuple(multiples.get(name, 0) for name in names)
+
+        if not self.displacement:
+            return WheelErrors()
+        return WheelErrors(
+            tuple(Rotation(name, self.orders[name]) for name in names[carriers:]),
+            tuple(Sidebands(row(key), base) for key, base in self.beside),
+            np.array([row(key) for key in self.displacement], dtype=np.int64).reshape(len(self.displacement), -1),
+            np.array(list(self.displacement.values())),
+            np.array([self.reaction[key] for key in self.displacement]),
         )
-    return WheelErrors(tuple(shafts), tuple(errors))
 
+    def _wheel(self, mesh: int, end: int) -> tuple[str, int]:
+        """Body and number of teeth of a gear of a mesh."""
+        own = self.assembly.elements[mesh].mesh
+        gear = (own.pair.pinion, own.pair.gear)[end]
+        return (own.pinion, own.gear)[end], gear.teeth
 
-def _harmonics(pieces: Floats) -> Complexes:
-    """Fourier coefficients over a revolution of a function of equal cubic pieces (pieces, 4)."""
-    powers = np.vander(np.arange(SAMPLES_PER_PIECE) / SAMPLES_PER_PIECE, 4, increasing=True).T
-    samples = (pieces @ powers).ravel()
-    return fourier_coefficients(samples, len(pieces) // 2)
+    def _orders(self, mesh: int, end: int) -> list[tuple[int, complex]]:
+        """Orders of a gear's deviation and their coefficients at zero angle of the input, m."""
+        meshes = self.assembly.meshes
+        found: dict[int, complex] = {}
+        pieces = int(meshes.error_pieces[mesh, end])
+        if pieces:
+            angle = sum(sign * self.still[at] for at, sign in self._angles(mesh, end))
+            powers = np.vander(np.arange(SAMPLES_PER_PIECE) / SAMPLES_PER_PIECE, 4, increasing=True).T
+            samples = (meshes.error[mesh, end, :pieces] @ powers).ravel()
+            values = fourier_coefficients(samples, pieces // 2)
+            values = values * np.exp(1j * np.arange(len(values)) * angle)
+            found = {n: complex(x) for n, x in enumerate(values) if abs(x) > LEAST * np.abs(values).max()}
+        offset = self.assembly.gearbox.pin_offsets.get(self._wheel(mesh, end)[0])
+        if offset is not None:
+            gradient = meshes.deflection[mesh, BODY_SIZE * end : BODY_SIZE * end + 2]
+            found[0] = found.get(0, 0.0) - complex(gradient @ np.array(offset))
+        return list(found.items())
 
+    def _angles(self, mesh: int, end: int) -> list[tuple[int, float]]:
+        """Coordinates of a gear's angle against its frame, each with its sign."""
+        index = self.assembly.meshes.coordinates[mesh]
+        both = ((int(index[BODY_SIZE * end + SPIN]), 1.0), (int(index[FRAME]), -1.0))
+        return [(at, sign) for at, sign in both if at >= 0]
 
-def _orders_of(harmonics: Complexes, teeth: int) -> set[int]:
-    """Orders n of a shaft up to half a mesh order that a deviation has, by itself or at h z +- n."""
-    nearest = np.arange(len(harmonics))
-    nearest = np.abs(nearest - teeth * np.round(nearest / teeth)).astype(np.int64)
-    power = np.bincount(nearest, weights=np.abs(harmonics) ** 2, minlength=1)
-    sizes = np.sqrt(power)
-    sizes[0] = 0.0
-    return set(np.flatnonzero(largest(sizes, NEGLECTED * float(np.linalg.norm(sizes)))).tolist()) - {0}
+    def _turning(
+        self, mesh: int, end: int, planets: PlanetSet | None, place: int, waves: int
+    ) -> list[tuple[int, Floats | Complexes, Complexes]]:
+        """Multiples of the carrier's angle, with the shares of a mesh in waves and of its gear's angle in motion."""
+        angles = self._angles(mesh, end)
+        if planets is None:
+            rotation = self.frame.matrices(0.0)[0]
+            row = sum((sign * rotation[at] for at, sign in angles), np.zeros(len(rotation)))
+            return [(0, np.ones(1), row.astype(complex))]
+        most = planets.waves // 2
+        samples = 2 * (2 * most + 1)
+        turned = 2.0 * np.pi * np.arange(samples) / samples
+        values = planets.values(turned)[:, :, :waves]
+        shapes = values[:, place] / (values[0] ** 2).sum(axis=0)
+        rows = []
+        for angle in turned:
+            rotation = self.frame.matrices(angle / planets.ratio)[0]
+            rows.append(sum((sign * rotation[at] for at, sign in angles), np.zeros(len(rotation))))
+        of_shapes = np.fft.fft(shapes, axis=0) / samples
+        of_rows = np.fft.fft(np.array(rows), axis=0) / samples
+        return [(turn, of_shapes[turn], of_rows[turn]) for turn in range(-most, most + 1)]
+
+    def _key(self, mesh: int, end: int, planets: PlanetSet | None, order: int, turn: int) -> Key:
+        """Multiples of rotations of a term: of the gear against its frame, and of the carrier."""
+        body = self._wheel(mesh, end)[0]
+        frame = self.assembly.elements[mesh].mesh.frame
+        relative = self.frame.speeds.get(body, 0.0) - self.frame.speeds.get(frame, 0.0)
+        multiples: dict[str, int] = {}
+        if order:
+            name = f"rotation of {body}"
+            if planets is not None:
+                family = self.assembly.gearbox.body(body).family
+                name = f"rotation of {family} in {planets.carrier}"
+                if abs(abs(relative) - abs(planets.ratio)) < SAME * abs(relative):
+                    name = self._carrier(planets)
+            self.orders.setdefault(name, abs(relative))
+            multiples[name] = order * int(math.copysign(1.0, relative))
+        if turn and planets is not None:
+            name = self._carrier(planets)
+            self.orders.setdefault(name, abs(planets.ratio))
+            multiples[name] = multiples.get(name, 0) + turn * int(math.copysign(1.0, planets.ratio))
+        return tuple(sorted((name, multiple) for name, multiple in multiples.items() if multiple))
+
+    def _carrier(self, planets: PlanetSet) -> str:
+        """Name of the rotation of a carrier: its own where its planets mesh out of phase."""
+        out_of_phase = [name for name, _ in self.waves.carriers]
+        return planets.carrier if planets.carrier in out_of_phase else f"rotation of {planets.carrier}"
+
+    def _add(self, terms: dict[Key, Complexes], key: Key, value: Complexes) -> None:
+        terms[key] = terms[key] + value if key in terms else value
