@@ -619,14 +619,14 @@ class HarmonicBalanceModel:
 
     @cached_property
     def _displacements(self) -> Complexes:
-        """Deviations (n, m) of gears and pins at the lines where the input turns about +z, m."""
+        """Deviations (n, m) of gears at the lines where the input turns about +z, m."""
         waves = self.waves
         if not self.errors.sidebands:
             return np.zeros((len(self.lines.index), len(waves.waves)), dtype=complex)
         return self.errors.at_lines(self.errors.displacement, self.lines, len(waves.base_orders), 1.0)
 
     def wheel_displacements(self, speed: float) -> Complexes:
-        """Deviations (n, m) of gears and pins in the meshes at the lines, at a speed of the input (rad/s), m."""
+        """Deviations (n, m) of gears in the meshes at the lines, at a speed of the input (rad/s), m."""
         return self._displacements if speed > 0.0 else self._displacements.conj()
 
     def _load_response_at(

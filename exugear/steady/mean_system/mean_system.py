@@ -262,10 +262,10 @@ def _check(assembly: Assembly) -> None:
         raise SteadyError("the gear train has no meshes and no excitation; use exugear run instead")
     if assembly.travelling.first.size:
         raise SteadyError(ELASTIC_RING)
-    if gearbox.pin_offsets and not assembly.variant.has_bearings:
+    if gearbox.pin_offsets:
         raise SteadyError(
-            "pins: on ideal joints a displaced pin would carry a planet out of its meshes; use a variant with "
-            "bearings, or exugear run"
+            "pins: position errors cause unequal planet loads that rotate with the carrier, which the steady-state "
+            "response cannot treat; remove them, or use exugear run"
         )
     # Rows of rolling elements must neither pass nor turn against the load that they carry.
     rolling = assembly.connectors.rolling

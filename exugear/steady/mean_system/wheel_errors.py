@@ -1,4 +1,4 @@
-"""Pitch deviations and run-out of gears, and displaced planet pins: known displacements at the orders of shafts.
+"""Pitch deviations and run-out of gears: displacements known over the revolution of their shafts.
 
 A deviation e of a gear is subtracted from the deflection d of its meshes, so that the force of a mesh is
 
@@ -10,9 +10,7 @@ of the perfect one: by the work along e, the static force F_0 has the torque F_0
 too. The averaged system itself has no deviations.
 
 Meshes of planets are waves around the carrier (`exugear.steady.mean_system.mesh_waves`), so that a deviation of order n
-against the carrier appears at n plus and minus multiples of the carrier's rotation. A pin out of place by o displaces
-its planet, whose coordinates count from there: the meshes of the planet have the constant deviation -g o with the
-gradient g of their deflection.
+against the carrier appears at n plus and minus multiples of the carrier's rotation.
 """
 
 from __future__ import annotations
@@ -41,7 +39,7 @@ LEAST = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class WheelErrors:
-    """Deviations of all gears and pins as Fourier series of the angles of some rotations; without any, it is empty.
+    """Deviations of all gears as Fourier series of the angles of some rotations; without any, it is empty.
 
     Values hold where the input turns about +z; where it turns about -z, they are the conjugates.
     """
@@ -78,23 +76,15 @@ class WheelErrors:
 
 
 def without_wheel_errors(assembly: Assembly) -> Assembly:
-    """Return an assembly whose gears have no deviations and whose planet pins are in place."""
+    """Return an assembly whose gears have no deviations."""
     none = (np.zeros(0), np.zeros(0))
     elements = tuple(replace(element, errors=none) for element in assembly.elements)
     no_pieces = np.zeros_like(assembly.meshes.error_pieces)
-    local = assembly.connectors.local.copy()
-    for n, bearing in enumerate(assembly.supports):
-        local[n, 0, :2] -= assembly.gearbox.pin_offsets.get(bearing.body, (0.0, 0.0))
-    return replace(
-        assembly,
-        elements=elements,
-        meshes=assembly.meshes._replace(error_pieces=no_pieces),
-        connectors=assembly.connectors._replace(local=local),
-    )
+    return replace(assembly, elements=elements, meshes=assembly.meshes._replace(error_pieces=no_pieces))
 
 
 def wheel_errors(assembly: Assembly, waves: MeshWaves) -> WheelErrors:
-    """Find the deviations of an assembly's gears and pins, and the orders that matter.
+    """Find the deviations of an assembly's gears, and the orders that matter.
 
     Parameters
     ----------
@@ -187,20 +177,14 @@ class _Series:
     def _orders(self, mesh: int, end: int) -> list[tuple[int, complex]]:
         """Orders of a gear's deviation and their coefficients at zero angle of the input, m."""
         meshes = self.assembly.meshes
-        found: dict[int, complex] = {}
         pieces = int(meshes.error_pieces[mesh, end])
-        if pieces:
-            angle = sum(sign * self.still[at] for at, sign in self._angles(mesh, end))
-            powers = np.vander(np.arange(SAMPLES_PER_PIECE) / SAMPLES_PER_PIECE, 4, increasing=True).T
-            samples = (meshes.error[mesh, end, :pieces] @ powers).ravel()
-            values = fourier_coefficients(samples, pieces // 2)
-            values = values * np.exp(1j * np.arange(len(values)) * angle)
-            found = {n: complex(x) for n, x in enumerate(values) if abs(x) > LEAST * np.abs(values).max()}
-        offset = self.assembly.gearbox.pin_offsets.get(self._wheel(mesh, end)[0])
-        if offset is not None:
-            gradient = meshes.deflection[mesh, BODY_SIZE * end : BODY_SIZE * end + 2]
-            found[0] = found.get(0, 0.0) - complex(gradient @ np.array(offset))
-        return list(found.items())
+        if not pieces:
+            return []
+        powers = np.vander(np.arange(SAMPLES_PER_PIECE) / SAMPLES_PER_PIECE, 4, increasing=True).T
+        values = fourier_coefficients((meshes.error[mesh, end, :pieces] @ powers).ravel(), pieces // 2)
+        angle = sum(sign * self.still[at] for at, sign in self._angles(mesh, end))
+        values = values * np.exp(1j * np.arange(len(values)) * angle)
+        return [(n, complex(x)) for n, x in enumerate(values) if abs(x) > LEAST * np.abs(values).max()]
 
     def _angles(self, mesh: int, end: int) -> list[tuple[int, float]]:
         """Coordinates of a gear's angle against its frame, each with its sign."""

@@ -125,12 +125,9 @@ def test_planets_that_the_frame_cannot_hold_are_refused_with_the_reason(grc, sti
         mesh_waves(mean_system(made, np.array([0.0, 10.0])))
 
 
-def test_errors_of_wheels_are_refused_with_the_reason(grc, stiffness):
-    varied = grc.varied({"deviations": {"sun": {"body": "lss", "gear": "sun", "runout_um": 20.0}}})
-    with pytest.raises(
-        SteadyError,
-        match="it meshes with planets, which the steady-state response does not include",
-    ):
+def test_pins_out_of_place_are_refused_with_the_reason(grc, stiffness):
+    varied = grc.varied({"pins": {"one": {"body": "planet_1", "tangential_um": 20.0}}})
+    with pytest.raises(SteadyError, match="pins: position errors cause unequal planet loads"):
         mean_system(assemble(varied, Choice("rigid"), stiffness), np.array([0.0, 10.0]))
 
 
