@@ -134,12 +134,13 @@ class _Series:
                     if order == 0 and turn < 0:
                         continue  # the conjugate of that which turns the other way
                     key = self._key(mesh, end, planets, order, turn)
-                    # A term at rest counts with its conjugate.
-                    whole = (lambda x: 2.0 * x.real) if not key and (order or turn) else (lambda x: x)
                     displaced = np.zeros(len(waves), dtype=complex)
-                    displaced[own] = whole(value * shape)
+                    displaced[own] = value * shape
+                    pushed = 1j * order * value * self.load[own[0]] * row
+                    if not key and (order or turn):  # at rest it counts with its conjugate
+                        displaced, pushed = (2.0 * part.real.astype(complex) for part in (displaced, pushed))
                     self._add(self.displacement, key, displaced)
-                    self._add(self.reaction, key, whole(1j * order * value * self.load[own[0]] * row))
+                    self._add(self.reaction, key, pushed)
                     # Orders at the same distance from a mesh order are sidebands of one kind.
                     nearest = self._key(mesh, end, planets, order - teeth * round(order / teeth), turn)
                     sizes[nearest] = math.hypot(sizes.get(nearest, 0.0), float(np.linalg.norm(displaced)))
