@@ -24,7 +24,7 @@ from exugear.steady.harmonics.branches import NEIGHBOURS, predicted_top, standin
 from exugear.steady.mean_system.mean_system import MeanSystem, mean_modes
 from exugear.steady.mean_system.mesh_places import DEFLECTION
 from exugear.steady.mean_system.signals import Quantity
-from exugear.steady.response import transmission_errors
+from exugear.steady.response import mean_wheel_error_forces, transmission_errors
 from exugear.system.statics import linearise
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, SingleComplexes
 from fe_ste.tools.threads import side_by_side
@@ -339,6 +339,7 @@ def _excitation(model: HarmonicBalanceModel, speed: float, line: int) -> tuple[C
     """Generalized peak forces of each wave (size, m f) on a line, and their sum (size,)."""
     ports = model.ports_at(speed)
     excess = transmission_errors(model, ports, speed)[line]
+    excess[:, DEFLECTION] += mean_wheel_error_forces(model, speed)[line]
     forces = -2.0 * model.loads(ports) * excess.ravel()
     return forces, np.asarray(forces.sum(axis=1))
 

@@ -149,7 +149,7 @@ class PointSolver:
         """Find the forces of the meshes (lines, m, f) that vary in the static state, N, bearings being linear."""
         if not self.linear.loses_contact:
             forces = transmission_errors(self.linear, interface.ports, interface.speed)
-            forces[..., DEFLECTION] += mean_wheel_error_forces(self.linear, interface)
+            forces[..., DEFLECTION] += mean_wheel_error_forces(self.linear, interface.speed)
             return forces
         balance = HarmonicResidual(self.linear, interface, self.linear.sampling)
         return balance.forces(balance.static)[0]

@@ -80,7 +80,7 @@ def linear_response(model: HarmonicBalanceModel, interface: Interface) -> Respon
     w, s contains w (g - g0), and F_0 w is a moment.
     """
     excess = transmission_errors(model, interface.ports, interface.speed)
-    excess[..., DEFLECTION] += mean_wheel_error_forces(model, interface)
+    excess[..., DEFLECTION] += mean_wheel_error_forces(model, interface.speed)
     deflection = interface.static[..., DEFLECTION] + _answer(interface, excess)[..., DEFLECTION]
     return _response(model, interface, deflection, excess, 0)
 
@@ -104,11 +104,11 @@ def transmission_errors(model: HarmonicBalanceModel, ports: MeshInterface, speed
     return found
 
 
-def mean_wheel_error_forces(model: HarmonicBalanceModel, interface: Interface) -> Complexes:
+def mean_wheel_error_forces(model: HarmonicBalanceModel, speed: float) -> Complexes:
     """Find the forces (n, m) of the deviations of gears in the averaged system, -k_mean e - c e', N."""
-    errors = model.wheel_displacements(interface.speed)
-    waves = model.waves
-    return np.asarray(-(waves.mean_stiffness + 1j * interface.frequencies[:, None] * waves.damping) * errors)
+    frequencies = abs(speed) * model.lines.orders
+    stiffness = model.waves.mean_stiffness + 1j * frequencies[:, None] * model.waves.damping
+    return np.asarray(-stiffness * model.wheel_displacements(speed))
 
 
 def wheel_error_forces(model: HarmonicBalanceModel, interface: Interface) -> Complexes:
@@ -119,7 +119,7 @@ def wheel_error_forces(model: HarmonicBalanceModel, interface: Interface) -> Com
         return forces
     errors = forces.copy()
     errors[..., DEFLECTION] = model.wheel_displacements(interface.speed)
-    forces[..., DEFLECTION] = mean_wheel_error_forces(model, interface)
+    forces[..., DEFLECTION] = mean_wheel_error_forces(model, interface.speed)
     beyond = _slopes_beyond_mean(model, interface)
     return forces - model.coupling.of(beyond, errors.reshape(len(errors), -1)).reshape(forces.shape)
 
