@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -224,10 +224,15 @@ def response_quantities(data: xr.Dataset) -> tuple[Quantity, ...]:
     return quantities_of([str(name) for name in data["signal"].to_numpy()], json.loads(str(data.attrs["mounts"])))
 
 
-def complex_amplitudes(data: xr.Dataset) -> SingleComplexes:
-    """Return the complex amplitudes (points, lines, signals) of a stored response; of line 0 the mean."""
-    phase = data["phase"].to_numpy()
-    return np.asarray(data["amplitude"].to_numpy() * (np.cos(phase) + 1j * np.sin(phase)), dtype=np.complex64)
+def complex_amplitudes(data: xr.Dataset, signals: Sequence[int] | None = None) -> SingleComplexes:
+    """Return the complex amplitudes (points, lines, signals) of a stored response, all or some; of line 0 the mean."""
+    some = slice(None) if signals is None else list(signals)
+    phase = data["phase"].to_numpy()[..., some]
+    size = data["amplitude"].to_numpy()[..., some]
+    found = np.empty(size.shape, dtype=np.complex64)
+    found.real = size * np.cos(phase)
+    found.imag = size * np.sin(phase)
+    return found
 
 
 def with_names(data: xr.Dataset) -> xr.Dataset:

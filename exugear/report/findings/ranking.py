@@ -263,7 +263,8 @@ def ranking_of(data: xr.Dataset, speeds: tuple[float, float] | None = None, want
             others.append(group)
         group[name] = place, point, line
     limits = _limits(data, quantities, peaks)
-    found = tuple(_resonance(data, quantities, sizes, group, limits) for group in groups)
+    lines = _Lines.of(data)
+    found = tuple(_resonance(lines, quantities, sizes, group, limits) for group in groups)
     return Ranking(found, (low, high), whole, _accelerating_parts(data), quantity=first, reason=reason)
 
 
@@ -429,8 +430,23 @@ def _is_same_resonance(group: Mapping[str, tuple[int, int, int]], speed: Floats,
     return bool(abs(speed[point] - speed[first]) <= SAME_SPEED_TOLERANCE * speed[first])
 
 
+@dataclass(frozen=True)
+class _Lines:
+    """Names and orders of the lines but 0, and speeds of the points (rad/s), taken from the file once."""
+
+    names: tuple[str, ...]
+    orders: Floats
+    speeds: Floats
+
+    @classmethod
+    def of(cls, data: xr.Dataset) -> _Lines:
+        bases = tuple(str(name) for name in data["base"].to_numpy())
+        names = tuple(line_name(tuple(multiples), bases) for multiples in data["index"].to_numpy()[1:].tolist())
+        return cls(names, data["order"].to_numpy()[1:].astype(np.float64), data["speed"].to_numpy().astype(np.float64))
+
+
 def _resonance(
-    data: xr.Dataset,
+    lines: _Lines,
     quantities: tuple[Quantity, ...],
     sizes: Mapping[str, Floats],
     group: Mapping[str, tuple[int, int, int]],
@@ -444,11 +460,9 @@ def _resonance(
         amplitudes[quantity.name] = PeakAmplitude(
             float(at.max()), quantity.places[int(at.argmax())], place, limits.get((point, line, quantity.name))
         )
-    bases = tuple(str(name) for name in data["base"].to_numpy())
-    order = float(data["order"][line + 1])
-    speed = float(data["speed"][first])
-    name = line_name(tuple(int(n) for n in data["index"].to_numpy()[line + 1]), bases)
-    return Resonance(name, order, speed, order * abs(speed) / (2.0 * np.pi), amplitudes)
+    order = float(lines.orders[line])
+    speed = float(lines.speeds[first])
+    return Resonance(lines.names[line], order, speed, order * abs(speed) / (2.0 * np.pi), amplitudes)
 
 
 def _accelerating_parts(data: xr.Dataset) -> str:
@@ -597,7 +611,7 @@ def response_spectra(
     speed, places = np.unique(np.abs(response["speed"].to_numpy()), return_index=True)
     names = [str(name) for name in response["signal"].to_numpy()]
     # Component 0 is the mean.
-    components = complex_amplitudes(response)[places, 1:][..., [names.index(name) for name in signals]]
+    components = complex_amplitudes(response, [names.index(name) for name in signals])[places, 1:]
     amplitude = vector_peak(components.astype(np.complex128))
     orders = response["order"].to_numpy()[1:]
     unknown = [abs(float(point["speed"])) for point in json.loads(response.attrs.get("not_converged", "[]"))]
