@@ -272,7 +272,7 @@ SLOWEST_BRANCH = 0.01
 """Share of the fastest speed at which a branch from standstill begins."""
 LONGEST_WARNING = 300
 """Letters of a remark."""
-AT_ONCE = 16
+AT_ONCE = 8
 """Points that two threads solve before progress is shown."""
 Kept = Callable[[SolvedPoints], None]
 
