@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from exugear.gearbox.named_files import LARGEST_TABLE
-from exugear.gearbox.parts import Bearing, Body, Coupling, DampingTimes, Joint, LoadCase, PointForce
+from exugear.gearbox.parts import Bearing, Body, Coupling, DampingTimes, Joint, LoadCase, PointForce, TorqueOrder
 from exugear.gearbox.reading import Origin, part_of_each, parts_of_each
 from exugear.gearbox.sections.bodies import BodySection, InertiaSection
-from exugear.gearbox.sections.case import DampingSection, ForceSection, GearboxFile, LoadCaseSection
+from exugear.gearbox.sections.case import DampingSection, ExcitationSection, ForceSection, GearboxFile, LoadCaseSection
 from exugear.gearbox.sections.connections import (
     BearingSection,
     ConnectorDampingSection,
@@ -449,6 +449,35 @@ def point_forces(origin: Origin, bodies: Mapping[str, Body]) -> tuple[PointForce
         return (PointForce(name, section.body, position, (*section.force_N, *section.moment_N_m)),)
 
     return parts_of_each(convert_section, origin.case.forces)
+
+
+def torque_orders(origin: Origin, bodies: Mapping[str, Body]) -> tuple[TorqueOrder, ...]:
+    """Torques on enabled bodies that vary with their angle, order by order.
+
+    Raises
+    ------
+    GearboxFileError
+        A torque acts on the ground, on a body that does not rotate, on a planet, or on an unknown body.
+    """
+
+    def convert_section(name: str, section: ExcitationSection) -> tuple[TorqueOrder, ...]:
+        key = f"excitations.{name}"
+        if section.body == GROUND or not origin.are_enabled(key, section.body) or not section.enabled:
+            if section.body == GROUND:
+                raise origin.error(f"{key}.body = {GROUND!r}: a torque on the ground has no effect; set a moving body")
+            return ()
+        if origin.case.bodies[section.body].carrier is not None or bodies[section.body].fixed:
+            raise origin.error(
+                f"{key}.body = {section.body!r}: a planet or a fixed body cannot have a varying torque; set a rotating "
+                "body on a fixed axis"
+            )
+        phases = section.phase_deg or (0.0,) * len(section.orders)
+        return tuple(
+            TorqueOrder(name, section.body, order * section.pole_pairs, amplitude, math.radians(phase))
+            for order, amplitude, phase in zip(section.orders, section.torque_N_m, phases, strict=True)
+        )
+
+    return parts_of_each(convert_section, origin.case.excitations)
 
 
 def couplings(origin: Origin, spinning: Sequence[str], bearing_names: Sequence[str]) -> tuple[Coupling, ...]:

@@ -29,6 +29,7 @@ from exugear.gearbox.parts import (
     Mesh,
     PairSpec,
     PointForce,
+    TorqueOrder,
     WheelDeviation,
     connector_matrix,
 )
@@ -322,6 +323,11 @@ class Gearbox(ReprMixin):
     def forces(self) -> tuple[PointForce, ...]:
         """Constant forces and moments on bodies."""
         return body_parts.point_forces(self._origin, self.named_bodies)
+
+    @cached_property
+    def torque_orders(self) -> tuple[TorqueOrder, ...]:
+        """Torques on bodies that vary with their angle, order by order."""
+        return body_parts.torque_orders(self._origin, self.named_bodies)
 
     @cached_property
     def couplings(self) -> tuple[Coupling, ...]:

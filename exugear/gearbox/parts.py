@@ -152,6 +152,21 @@ class PointForce:
 
 
 @dataclass(frozen=True)
+class TorqueOrder:
+    """Torque A cos(n theta + phi) on a body at the angle theta."""
+
+    excitation: str
+    """Name of its section."""
+    body: str
+    order: int
+    """Periods n per revolution of the body."""
+    amplitude: float
+    """A, N m."""
+    phase: float
+    """phi, rad."""
+
+
+@dataclass(frozen=True)
 class Coupling:
     """Torsional spring and damper between two rotating bodies."""
 

@@ -102,11 +102,13 @@ def crossings(
     # Orders of a single mesh frequency and their sidebands, or of a shaft.
     several = np.count_nonzero(index, axis=1) > 1
     lines = [int(line) for line in np.flatnonzero(~several) if line]
-    forces = forcing(model.at(float(model.system.speeds[1])))[lines]
+    middle = float(model.system.speeds[1])
+    forces = forcing(model.at(middle))[lines]
+    loads = _loads_beside(model, middle)[lines]
     met = _passages(tracks, model.lines.orders[lines])
     if not met:
         return ()
-    peaks = np.array([_peak(model, tracks, mode, speed, forces[at]) for mode, at, speed in met])
+    peaks = np.array([_peak(model, tracks, mode, speed, forces[at], loads[at]) for mode, at, speed in met])
     shares = _shares(peaks)
     counted = _shares(peaks)
     if operation is not None:
@@ -219,15 +221,17 @@ def _followed(system: MeanSystem, tracks: ModeTracks, mode: int, speed: float) -
     return Mode(complex(tracks.eigenvalues[n, mode]), tracks.shapes[n, mode], left)
 
 
-def _peak(model: HarmonicBalanceModel, tracks: ModeTracks, mode: int, speed: float, force: Complexes) -> Floats:
-    """Find what a mode makes at resonance of a line with forces (m, f) of the meshes, (signals,).
+def _peak(
+    model: HarmonicBalanceModel, tracks: ModeTracks, mode: int, speed: float, force: Complexes, load: Complexes
+) -> Floats:
+    """Find what a mode makes at resonance of a line with forces (m, f) of the meshes and a load (size,), (signals,).
 
     Signals are the overall transmission error and the deflections of the meshes.
     """
     followed = _followed(model.system, tracks, mode, speed)
     ports = model.ports_at(speed)
     rows = np.vstack([model.row_of_overall(speed)[None], ports.readings[:, DEFLECTION]])
-    pushed = abs(followed.left @ (model.loads(ports) @ force.ravel()))
+    pushed = abs(followed.left @ (load - model.loads(ports) @ force.ravel()))
     return np.asarray(np.abs(rows @ followed.shape) * pushed / abs(followed.value.real))
 
 
@@ -281,7 +285,7 @@ class Contributions:
     amplitude: float
     """Peak amplitude of the line at the level `linear`, m."""
     meshes: Mapping[str, float]
-    """Share by family of meshes."""
+    """Share by family of meshes, and by stated torque."""
     modes: tuple[tuple[float, float], ...]
     """Frequency (Hz) and share of each mode that carries a hundredth or more, the strongest first."""
     supports: Mapping[str, float]
@@ -311,6 +315,9 @@ def contributions(model: HarmonicBalanceModel, speed: float, line: int) -> Contr
     parts = (adjoint @ forces).reshape(len(model.waves.waves), -1).sum(axis=1)
     for wave, part in zip(model.waves.waves, parts, strict=True):
         meshes[wave.family] = meshes.get(wave.family, 0.0) + _share(complex(part), total)
+    for source in dict.fromkeys(filter(None, model.errors.source)):
+        if part := complex(2.0 * adjoint @ _loads_beside(model, speed, source)[line]):
+            meshes[source] = meshes.get(source, 0.0) + _share(part, total)
     supports, bodies = _derivatives(model, speed, frequency, adjoint, motion, total)
     modes = _modes(model, speed, frequency, loads, row, total)
     return Contributions(speed, abs(total), meshes, modes, supports, bodies)
@@ -341,7 +348,16 @@ def _excitation(model: HarmonicBalanceModel, speed: float, line: int) -> tuple[C
     excess = transmission_errors(model, ports, speed)[line]
     excess[:, DEFLECTION] += mean_wheel_error_forces(model, speed)[line]
     forces = -2.0 * model.loads(ports) * excess.ravel()
-    return forces, np.asarray(forces.sum(axis=1))
+    return forces, np.asarray(forces.sum(axis=1) + 2.0 * _loads_beside(model, speed)[line])
+
+
+def _loads_beside(model: HarmonicBalanceModel, speed: float, source: str | None = None) -> Complexes:
+    """Generalized forces (n, size) beside those of the meshes: of deviations and stated torques, or of one torque."""
+    errors = model.errors
+    if not errors.sidebands:
+        return np.zeros((len(model.lines.index), model.system.size), dtype=complex)
+    counted = np.array([source in (None, name) for name in errors.source])
+    return errors.at_lines(errors.reaction * counted[:, None], model.lines, len(model.waves.base_orders), speed)
 
 
 def _share(part: complex, total: complex) -> float:

@@ -76,7 +76,7 @@ MOST_LINES = 500
 class LoadResponse:
     """Response to loads on the bodies beside the forces along the meshes' rows at one speed; n orders.
 
-    These are the friction of the teeth, and the torques by which mesh forces act on gears whose deviations change.
+    These are the friction of the teeth, stated torques, and those by which mesh forces act on gears with deviations.
     """
 
     loads: Complexes
@@ -186,7 +186,7 @@ class HarmonicBalanceModel:
     ----------
     harmonics : of each mesh frequency. The mesh stiffness has twice as many.
     combinations : largest sum of multiples of several mesh frequencies
-    errors : deviations of gears, which add orders of their shafts
+    errors : deviations of gears and stated torques, which add orders of shafts
 
     Notes
     -----

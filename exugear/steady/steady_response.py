@@ -305,7 +305,9 @@ def response_of(
     report = progress or (lambda done, total: None)
     tracks = _tracks(model, even)
     operation = operating_range(assembly.gearbox)
-    at_resonances = settings.at_resonances and (model.loses_contact or model.waves.varies)
+    at_resonances = settings.at_resonances and (
+        model.loses_contact or model.waves.varies or bool(model.errors.sidebands)
+    )
     found = crossings(model, tracks, solver.forcing, operation) if at_resonances else ()
     folds: tuple[float, ...] = ()
     ended = ""

@@ -62,6 +62,7 @@ UNRELATED = (
     "report",
     "pins",
     "deviations",
+    "excitations",
 )
 """Sections of a gearbox file that do not affect the reduction of its bodies."""
 

@@ -210,4 +210,4 @@ def _load_table(
             damping=gearbox.case.damping.coupling_time_s * case.drive_stiffness,
             angle=(start_angle, driven_start_speed(gearbox, case), 0.5 * drive_rate(gearbox, case)),
         )
-    return LoadTable(case.torques, series, drive)
+    return LoadTable(case.torques, series, drive, gearbox.torque_orders)

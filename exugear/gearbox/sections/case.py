@@ -103,6 +103,37 @@ class ForceSection(Section):
         return self
 
 
+class ExcitationSection(Section):
+    """Torque on a rotating body that varies with its angle: ripple of an electric machine, an engine, a propeller.
+
+    The torque is the sum of torque_N_m cos(order x angle + phase) over the orders, in addition to constant torques. It
+    acts in runs, and in steady-state responses with the methods `linear` and `parametric`.
+    """
+
+    body: Name
+    """Body on which it acts."""
+    orders: Annotated[tuple[q.ShaftOrder, ...], Field(strict=False, min_length=1, max_length=200)]
+    """Periods per revolution of the body; with `pole_pairs`, per electrical revolution."""
+    torque_N_m: Annotated[tuple[q.RippleNm, ...], Field(strict=False, min_length=1, max_length=200)]
+    """Amplitude of each order, zero to peak."""
+    phase_deg: Annotated[tuple[q.AngleDeg, ...], Field(strict=False, max_length=200)] = ()
+    """Phase of each order at zero angle of the body; zero by default."""
+    pole_pairs: q.PolePairs = 1
+    """Factor on the orders: pole pairs of an electric machine."""
+    enabled: bool = True
+    """Whether it acts."""
+    description: Text = ""
+    """Description for the user."""
+
+    @model_validator(mode="after")
+    def _amplitudes(self) -> ExcitationSection:
+        if len(self.torque_N_m) != len(self.orders):
+            raise ValueError(f"set as many torque_N_m as orders: {len(self.torque_N_m)} for {len(self.orders)} orders")
+        if self.phase_deg and len(self.phase_deg) != len(self.orders):
+            raise ValueError(f"set as many phase_deg as orders: {len(self.phase_deg)} for {len(self.orders)} orders")
+        return self
+
+
 class OverallSection(Section):
     """Rotations that the overall transmission error compares, and the gear at which it is converted to a length."""
 
@@ -286,6 +317,7 @@ NAMED_TABLES = (
     "gears",
     "load_cases",
     "forces",
+    "excitations",
     "pins",
 )
 """Tables whose entries may have a label."""
@@ -320,6 +352,8 @@ class GearboxFile(Section):
     """Load cases in time, by name; the first is the default."""
     forces: Entries[ForceSection] = {}
     """Constant forces and moments on bodies, by name."""
+    excitations: Entries[ExcitationSection] = {}
+    """Torques that vary with the angle of a body, by name."""
     joints: Entries[JointSection] = {}
     """Ideal joints of the variant `rigid`, by name."""
     bearings: Entries[BearingSection] = {}

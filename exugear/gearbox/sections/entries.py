@@ -98,6 +98,9 @@ ElementSizeMm = Annotated[float, Range(0.2, 5000.0, (1.0, 500.0), "finer meshes 
 ElementsAround = Annotated[int, Range(6, 400, (6, 120), "finer meshes fill any memory")]
 Sectors = Annotated[int, Range(3, 63, (3, 31), "each is a seat of six coordinates")]
 AngleDeg = Annotated[float, Range(-3600.0, 3600.0, (-720.0, 720.0))]
+ShaftOrder = Annotated[int, Range(1, 2000, (1, 500), "periods per revolution, a whole number")]
+PolePairs = Annotated[int, Range(1, 200, (1, 60))]
+RippleNm = Annotated[float, Range(0.0, 1e9, (0.0, 1e7), "amplitude, zero to peak")]
 Phase = Annotated[float, _symmetric_range(1000.0, 10.0, "in mesh cycles")]
 
 # Masses, from watch gears to the rotors of hydro generators.

@@ -265,6 +265,8 @@ class Sidebands:
     """Of all bases that follow those of the meshes."""
     base: int
     """Base of the mesh frequency."""
+    reach: int | None = None
+    """Highest harmonic of the mesh frequency; None for all of a line set."""
 
 
 def with_rotations(
@@ -289,19 +291,21 @@ def with_rotations(
         return lines
     first = len(lines.bases)
     bases = np.append(lines.bases, [rotation.order for rotation in rotations])
-    rows = np.zeros((len(lines.index) + len(sidebands) * (2 * harmonics + 1), len(bases)), dtype=np.int64)
-    rows[: len(lines.index), :first] = lines.index
-    more = rows[len(lines.index) :].reshape(len(sidebands), 2 * harmonics + 1, -1)
-    for own, beside_mesh in zip(more, sidebands, strict=True):
+    known = np.hstack([lines.index, np.zeros((len(lines.index), len(rotations)), dtype=np.int64)])
+    more = []
+    for beside_mesh in sidebands:
+        reach = harmonics if beside_mesh.reach is None else min(harmonics, beside_mesh.reach)
+        own = np.zeros((2 * reach + 1, len(bases)), dtype=np.int64)
         own[:, meshes:] = beside_mesh.multiples
-        own[:, beside_mesh.base] = np.arange(-harmonics, harmonics + 1)
+        own[:, beside_mesh.base] = np.arange(-reach, reach + 1)
+        more.append(own)
     # Rotations lead the search for common frequencies: meshes are whole multiples of them, however many teeth.
     lead = [*range(first, len(bases)), *range(meshes)]
     shared = _independent(bases[lead], whole=MOST_TEETH)
     units = np.zeros((len(bases), shared.shape[1] + first - meshes), dtype=np.int64)
     units[lead, : shared.shape[1]] = shared
     units[meshes:first, shared.shape[1] :] = np.eye(first - meshes, dtype=np.int64)
-    return _lines_of_rows(rows, bases, units)
+    return _lines_of_rows(np.vstack([known, *more]), bases, units)
 
 
 def joined(one: LineSet, other: LineSet) -> LineSet:

@@ -1,4 +1,4 @@
-"""Pitch deviations and run-out of gears: displacements known over the revolution of their shafts.
+"""Excitations at the orders of shafts: pitch deviations and run-out of gears, and stated torques.
 
 A deviation e of a gear is subtracted from the deflection d of its meshes, so that the force of a mesh is
 
@@ -7,7 +7,7 @@ A deviation e of a gear is subtracted from the deflection d of its meshes, so th
 and -k e - c e' is a given force at the orders n of the shaft. The stiffness k varies with the mesh cycle, which brings
 the sidebands h z +- n of the mesh orders h z of a gear with z teeth. The normal of a flank with deviations is not that
 of the perfect one: by the work along e, the static force F_0 has the torque F_0 de/dphi on the gear, which is given,
-too. The averaged system itself has no deviations.
+too. The averaged system itself has no deviations. A stated torque on a body is given like this one.
 
 Meshes of planets are waves around the carrier (`exugear.steady.mean_system.mesh_waves`), so that a deviation of order n
 against the carrier appears at n plus and minus multiples of the carrier's rotation.
@@ -21,6 +21,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from exugear.gearbox.parts import TorqueOrder
 from exugear.steady.harmonics.lines import SAME, LineSet, Rotation, Sidebands, fourier_coefficients, largest
 from exugear.steady.mean_system.mesh_waves import MeshWaves
 from exugear.steady.mean_system.rotating_frame import PlanetSet
@@ -33,13 +34,15 @@ NEGLECTED = 1e-2
 """Share of the root mean square of a mesh component's deviations in orders that are left out."""
 SAMPLES_PER_PIECE = 4
 """Samples of each cubic piece of a deviation for its Fourier coefficients; pieces are a fraction of a tooth."""
+REACH = 4
+"""Harmonics of each mesh frequency whose sidebands a stated torque has."""
 LEAST = 1e-9
 """Share of the largest coefficient below which one is zero but for round-off."""
 
 
 @dataclass(frozen=True, eq=False)
 class WheelErrors:
-    """Deviations of all gears as Fourier series of the angles of some rotations; without any, it is empty.
+    """Deviations of gears and stated torques as Fourier series of the angles of rotations; without any, it is empty.
 
     Values hold where the input turns about +z; where it turns about -z, they are the conjugates.
     """
@@ -53,7 +56,9 @@ class WheelErrors:
     displacement: Complexes = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
     """(t, m) deviations of the mesh components, m."""
     reaction: Complexes = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
-    """(t, size) generalized forces in the rotating frame by the static forces on the deviations, N and N m."""
+    """(t, size) generalized forces in the rotating frame, by the static forces on deviations and of stated torques."""
+    source: tuple[str, ...] = ()
+    """(t,) name of the stated torque that a term is of; empty for deviations."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -84,7 +89,7 @@ def without_wheel_errors(assembly: Assembly) -> Assembly:
 
 
 def wheel_errors(assembly: Assembly, waves: MeshWaves) -> WheelErrors:
-    """Find the deviations of an assembly's gears, and the orders that matter.
+    """Find the deviations of an assembly's gears and the stated torques, and the orders that matter.
 
     Parameters
     ----------
@@ -94,6 +99,8 @@ def wheel_errors(assembly: Assembly, waves: MeshWaves) -> WheelErrors:
     series = _Series(assembly, waves)
     for meshes, planets in waves.groups:
         series.add_family(meshes, planets)
+    for order in assembly.gearbox.torque_orders:
+        series.add_torque(order)
     return series.found()
 
 
@@ -113,10 +120,10 @@ class _Series:
         self.load = waves.mean_stiffness * (waves.values(assembly.meshes.deflection, speed) - waves.rest)
         self.orders = {name: modulator.order for name, modulator in waves.carriers}
         """Order of each rotation, by its name; those of carriers whose planets mesh out of phase come first."""
-        self.displacement: dict[Key, Complexes] = {}
-        self.reaction: dict[Key, Complexes] = {}
-        self.beside: list[tuple[Key, int]] = []
-        """Rotations, and the base of the mesh beside whose harmonics they appear."""
+        self.displacement: dict[tuple[str, Key], Complexes] = {}
+        self.reaction: dict[tuple[str, Key], Complexes] = {}
+        self.beside: list[tuple[Key, int, int | None]] = []
+        """Rotations, the base of the mesh beside whose harmonics they appear, and the highest of these."""
 
     def add_family(self, meshes: tuple[int, ...], planets: PlanetSet | None) -> None:
         """Add the deviations of all meshes of a family of planets, or of a single mesh."""
@@ -139,8 +146,8 @@ class _Series:
                     pushed = 1j * order * value * self.load[own[0]] * row
                     if not key and (order or turn):  # at rest it counts with its conjugate
                         displaced, pushed = (2.0 * part.real.astype(complex) for part in (displaced, pushed))
-                    self._add(self.displacement, key, displaced)
-                    self._add(self.reaction, key, pushed)
+                    self._add(self.displacement, ("", key), displaced)
+                    self._add(self.reaction, ("", key), pushed)
                     # Orders at the same distance from a mesh order are sidebands of one kind.
                     nearest = self._key(mesh, end, planets, order - teeth * round(order / teeth), turn)
                     sizes[nearest] = math.hypot(sizes.get(nearest, 0.0), float(np.linalg.norm(displaced)))
@@ -148,7 +155,23 @@ class _Series:
         if sizes:
             size = np.array(list(sizes.values()))
             kept = largest(size, NEGLECTED * float(np.linalg.norm(size))) & (size > 0.0)
-            self.beside += [(key, waves[own[0]].base) for key, is_kept in zip(sizes, kept, strict=True) if is_kept]
+            base = waves[own[0]].base
+            self.beside += [(key, base, None) for key, is_kept in zip(sizes, kept, strict=True) if is_kept]
+
+    def add_torque(self, torque: TorqueOrder) -> None:
+        """Add a torque that varies with the angle of a body."""
+        speed = self.frame.speeds.get(torque.body, 0.0)
+        place = self.assembly.spin[torque.body]
+        if speed == 0.0:
+            return
+        name = f"rotation of {torque.body}"
+        self.orders.setdefault(name, abs(speed))
+        key = ((name, torque.order * int(math.copysign(1.0, speed))),)
+        phase = torque.phase + torque.order * self.still[place]
+        row = self.frame.matrices(0.0)[0][place]
+        self._add(self.displacement, (torque.excitation, key), np.zeros(len(self.waves.waves), dtype=complex))
+        self._add(self.reaction, (torque.excitation, key), 0.5 * torque.amplitude * np.exp(1j * phase) * row)
+        self.beside += [(key, base, REACH) for base in range(len(self.waves.base_orders))]
 
     def found(self) -> WheelErrors:
         """Return what was collected."""
@@ -163,10 +186,11 @@ class _Series:
             return WheelErrors()
         return WheelErrors(
             tuple(Rotation(name, self.orders[name]) for name in names[carriers:]),
-            tuple(Sidebands(row(key), base) for key, base in self.beside),
-            np.array([row(key) for key in self.displacement], dtype=np.int64).reshape(len(self.displacement), -1),
+            tuple(Sidebands(row(key), base, reach) for key, base, reach in self.beside),
+            np.array([row(key) for _, key in self.displacement], dtype=np.int64).reshape(len(self.displacement), -1),
             np.array(list(self.displacement.values())),
-            np.array([self.reaction[key] for key in self.displacement]),
+            np.array([self.reaction[term] for term in self.displacement]),
+            tuple(source for source, _ in self.displacement),
         )
 
     def _wheel(self, mesh: int, end: int) -> tuple[str, int]:
@@ -241,5 +265,5 @@ class _Series:
         out_of_phase = [name for name, _ in self.waves.carriers]
         return planets.carrier if planets.carrier in out_of_phase else f"rotation of {planets.carrier}"
 
-    def _add(self, terms: dict[Key, Complexes], key: Key, value: Complexes) -> None:
+    def _add(self, terms: dict[tuple[str, Key], Complexes], key: tuple[str, Key], value: Complexes) -> None:
         terms[key] = terms[key] + value if key in terms else value

@@ -477,6 +477,9 @@ def set_loads(t: float, q: Floats, v: Floats, loads: Loads, series: Integers, f:
         angle = law[ANGLE] + t * (law[SPEED] + t * law[HALF_ACCELERATION])
         speed = law[SPEED] + 2.0 * t * law[HALF_ACCELERATION]
         f[i] += law[STIFFNESS] * (angle - q[i]) + law[DAMPING] * (speed - v[i])
+    for n in range(loads.turning.shape[0]):
+        i = loads.turning[n, 0]
+        f[i] += loads.ripple[n, 0] * math.cos(loads.turning[n, 1] * q[i] + loads.ripple[n, 1])
 
 
 @kernel

@@ -140,18 +140,29 @@ def add_loads(parts: Parts, loads: LoadTable) -> None:
                     loadUserFunction=_load_function(loads, name),
                 )
             )
-    drive = loads.drive
-    if drive is not None and drive.body not in elsewhere:
-        fixed = parts.mbs.AddNode(items.NodePointGround())
-        ground = parts.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=fixed, coordinate=0))
-        parts.mbs.AddObject(
-            items.CoordinateSpringDamper(
-                markerNumbers=[ground, parts.spin_marker(drive.body)],
-                stiffness=drive.stiffness,
-                damping=drive.damping,
-                springForceUserFunction=lambda mbs, t, item, u, v, k, d, offset: -drive.torque(t, u, v),
+    by_state: list[tuple[str, float, float, Callable[[float, float, float], float]]] = [
+        (body, 0.0, 0.0, lambda t, u, v, body=body: loads.torque_of_orders(body, u))
+        for body in dict.fromkeys(order.body for order in loads.orders)
+    ]
+    if loads.drive is not None:
+        by_state.append((loads.drive.body, loads.drive.stiffness, loads.drive.damping, loads.drive.torque))
+    for body, stiffness, damping, torque in by_state:
+        if body not in elsewhere:
+            fixed = parts.mbs.AddNode(items.NodePointGround())
+            ground = parts.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=fixed, coordinate=0))
+            parts.mbs.AddObject(
+                items.CoordinateSpringDamper(
+                    markerNumbers=[ground, parts.spin_marker(body)],
+                    stiffness=stiffness,
+                    damping=damping,
+                    springForceUserFunction=_torque_function(torque),
+                )
             )
-        )
+
+
+def _torque_function(torque: Callable[[float, float, float], float]) -> Callable[..., float]:
+    """Return the force of a spring to the ground that is a torque over time, angle and speed."""
+    return lambda mbs, t, item, u, v, k, d, offset: -torque(t, u, v)
 
 
 def _load_function(loads: LoadTable, body: str) -> Callable[[Any, float, float], float]:

@@ -23,10 +23,11 @@ States = tuple[np.ndarray, np.ndarray]
 def compiled_states(
     assembly: Assembly, q: np.ndarray, v: np.ndarray, load: Mapping[str, float], steps: int, step: float
 ) -> States:
-    """States by the compiled solver under constant torques (N m)."""
+    """States by the compiled solver under constant torques (N m) and those over angles that the file states."""
     out_q, out_v = np.empty((2, steps + 1, assembly.size))
     out_q[0], out_v[0] = q, v
-    done = CompiledSystem(assembly, q, v, LoadTable(load), step).advance(0, out_q[1:], out_v[1:])
+    loads = LoadTable(load, orders=assembly.gearbox.torque_orders)
+    done = CompiledSystem(assembly, q, v, loads, step).advance(0, out_q[1:], out_v[1:])
     assert done == steps
     return out_q, out_v
 
@@ -41,7 +42,8 @@ def exudyn_states(
         rows.append(np.array([q, v]))
         return True
 
-    ExudynSystem(assembly, q, v, LoadTable(load)).run(0.0, steps, step, keep, assembly.variant != "jointed")
+    loads = LoadTable(load, orders=assembly.gearbox.torque_orders)
+    ExudynSystem(assembly, q, v, loads).run(0.0, steps, step, keep, assembly.variant != "jointed")
     states = np.array(rows)
     return states[:, 0], states[:, 1]
 

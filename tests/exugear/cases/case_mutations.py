@@ -61,6 +61,8 @@ def _with_errors(grc: dict[str, Any]) -> dict[str, Any]:
         "hss": {"body": "hss", "gear": "hs_pinion", "cumulative_pitch_um": [float(n % 3) for n in range(22)]},
     }
     case["pins"] = {"first": {"body": "planet_1", "radial_um": 30.0, "tangential_um": -40.0}}
+    ripple = {"body": "hss", "orders": [6, 12], "torque_N_m": [30.0, 12.0], "phase_deg": [0.0, 45.0], "pole_pairs": 2}
+    case["excitations"] = {"ripple": ripple | {"enabled": True, "description": "generator"}}
     case["bodies"]["main_shaft"]["enabled"] = True
     case["ste"] = {"positions": 20, "grid": True, "torque_factors": [0.5, 1.0], "misalignment_um": [0.0, 30.0]}
     return case

@@ -49,6 +49,7 @@ ELSEWHERE |= {"CatalogueSection.fatigue_load_limit_kN", "ReportSection.quantity"
 """Keys of pages and of a life, whose computation takes too long here: another test looks for them in the program."""
 FOR_PEOPLE = {
     "LoadCaseSection.description",
+    "ExcitationSection.description",
     "ForceSection.description",
     "BearingSection.designation",
     "CatalogueSection.designation",

@@ -1,0 +1,126 @@
+"""Torques over the angle of a body in the steady-state response and in runs."""
+
+from __future__ import annotations
+
+import tomllib
+
+import numpy as np
+import pytest
+
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.reading import GearboxFileError
+from exugear.steady.crossings import contributions
+from exugear.steady.mean_system.rotating_frame import SteadyError
+from exugear.steady.response import signals
+from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.steady.steady_response import response_of
+from exugear.system.build import assemble
+from exugear.system.loads import LoadTable
+
+from ..cases.both_ways import compiled_states, exudyn_states
+from ..cases.spur import SPUR_CASE
+from ..cases.steady_runs import fitted, solver_of
+
+RIPPLE = {"body": "shaft_1", "orders": [3, 6], "pole_pairs": 2, "torque_N_m": [1.0, 5.0], "phase_deg": [0.0, 30.0]}
+SPEEDS = (50.0, 150.0)
+
+
+def gearbox(**changes):
+    return Gearbox.from_dict(tomllib.loads(SPUR_CASE) | {"excitations": {"ripple": RIPPLE | changes}})
+
+
+def spur_assembly(variation=1.0, **changes):
+    cycle = 2.0 * np.pi * np.arange(50) / 50
+    waves = 0.08 * np.cos(cycle) + 0.03 * np.sin(2 * cycle)
+    return assemble(gearbox(**changes), Choice("bushing"), {"spur": 3e8 * (1.0 + variation * waves)})
+
+
+def test_two_inertias_on_a_mesh_answer_as_in_closed_form():
+    """Rigid supports, constant stiffness: r_1 (theta_1 - theta_2 / i) of two inertias on the spring of the mesh.
+
+    The transmission error is r_1 theta_1 + r_2 theta_2 on the line of action; a torque T on J_1 moves it by
+    T r_1 / J_1 / (w_0^2 - w^2 + 2 i D w_0 w) with w_0^2 = k (r_1^2 / J_1 + r_2^2 / J_2).
+    """
+    content = tomllib.loads(SPUR_CASE) | {
+        "excitations": {"ripple": {"body": "shaft_1", "orders": [7], "torque_N_m": [4.0]}}
+    }
+    content["damping"] = {"mesh_time_s": 1e-5}
+    assembly = assemble(Gearbox.from_dict(content), Choice("rigid"), {"spur": np.array([3e8])})
+    solver = solver_of(assembly, (20.0, 400.0), "linear", 1)
+    r_1, r_2 = (0.5 * 3e-3 * teeth * np.cos(np.radians(20.0)) for teeth in (20, 30))
+    stiffness = 3e8 * (1.0 + 0j)
+    for speed in (50.0, 200.0, 390.0):
+        w = 7.0 * speed
+        spring = stiffness * (1.0 + 1j * w * 1e-5)
+        expected = 4.0 * r_1 / 1e-2 / (spring * (r_1**2 / 1e-2 + r_2**2 / 3e-2) - w**2)
+        overall = 2.0 * signals(solver.model, solver.response(speed))[:, 0]
+        line = int(np.argmin(np.abs(solver.model.lines.orders - 7.0)))
+        assert abs(overall[line]) == pytest.approx(abs(expected), rel=1e-6)
+
+
+@pytest.mark.parametrize("level", ["linear", "parametric"])
+def test_a_ripple_started_on_its_steady_state_stays_there(level):
+    """RK4 at 1/60 kHz; the order with 5 N m, a twentieth of the static torque."""
+    assembly = spur_assembly()
+    solver = solver_of(assembly, SPEEDS, level)
+    speed, lines = fitted(solver, solver.response(88.0), 0.8, 1.0 / 60e3, 0.4, assembly)
+    known = 2.0 * signals(solver.model, solver.response(speed))[1:, 0]
+    line = int(np.argmin(np.abs(solver.model.lines.orders[1:] - 12.0)))
+    assert abs(lines[line] - known[line]) < 5e-4 * abs(known[line])
+    if level == "parametric":
+        assert np.linalg.norm(lines - known) < 1e-3 * np.linalg.norm(known)
+
+
+def test_both_solvers_have_the_same_torque_over_the_angle():
+    assembly = spur_assembly()
+    rng = np.random.default_rng(5)
+    q, v = 1e-6 * rng.normal(size=(2, assembly.size))
+    q[assembly.spin["shaft_1"]] = 0.7
+    v[assembly.spin["shaft_1"]] = 80.0
+    loads = LoadTable({"shaft_1": 100.0}, orders=assembly.gearbox.torque_orders)
+    applied = loads.generalized(assembly, 0.0, q, v)[assembly.spin["shaft_1"]]
+    expected = 100.0 + np.cos(6 * 0.7) + 5.0 * np.cos(12 * 0.7 + np.pi / 6)
+    assert applied == pytest.approx(expected, rel=1e-12)
+    load = {"shaft_1": 100.0, "shaft_2": 150.0}
+    ours, exudyns = (states(assembly, q, v, load, 60, 2e-6)[0] for states in (compiled_states, exudyn_states))
+    np.testing.assert_allclose(ours - q, exudyns - q, rtol=0.0, atol=1e-6 * np.abs(ours - q).max(axis=0).min())
+    without = assemble(gearbox(enabled=False), Choice("bushing"), {"spur": 3e8 * np.ones(50)})
+    assert np.abs(compiled_states(without, q, v, load, 60, 2e-6)[0] - ours).max() > 1e-9
+
+
+def test_contributions_name_the_torque_beside_the_meshes():
+    """At the order of the ripple alone it makes all of the amplitude; at a mesh order nothing."""
+    model = solver_of(spur_assembly(), SPEEDS, "parametric").model
+    for order, shares in ((12.0, {"spur": 0.0, "ripple": 1.0}), (20.0, {"spur": 1.0})):
+        line = int(np.argmin(np.abs(model.lines.orders - order)))
+        assert contributions(model, 90.0, line).meshes == pytest.approx(shares, abs=1e-9)
+
+
+def test_resonances_of_a_ripple_are_looked_for_even_where_the_mesh_does_not_vary():
+    response = response_of(spur_assembly(variation=0.0), SteadySettings(SpeedRange(50.0, 150.0, 12), "parametric"))
+    assert response.crossings
+    assert response.base_names == ("spur", "rotation of shaft_1")
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"body": "nowhere"}, "excitations.ripple: no body 'nowhere'"),
+        ({"body": "ground"}, "excitations.ripple.body = 'ground': a torque on the ground has no effect"),
+        ({"orders": [0, 6]}, "excitations.ripple.orders"),
+        ({"orders": [1.5, 6]}, "excitations.ripple.orders"),
+        ({"torque_N_m": [1.0]}, "set as many torque_N_m as orders: 1 for 2 orders"),
+        ({"phase_deg": [1.0]}, "set as many phase_deg as orders: 1 for 2 orders"),
+        ({"torque_N_m": [1.0, float("nan")]}, "excitations.ripple.torque_N_m"),
+    ],
+)
+def test_an_impossible_excitation_is_refused_by_its_key(changes, said):
+    with pytest.raises(GearboxFileError, match=said.replace("[", r"\[").replace(".", r"\.")):
+        gearbox(**changes)
+
+
+def test_a_disabled_torque_does_not_act_and_the_nonlinear_method_is_refused():
+    assert gearbox(enabled=False).torque_orders == ()
+    with pytest.raises(SteadyError, match="excitations: the method nonlinear"):
+        response_of(spur_assembly(), SteadySettings(SpeedRange(50.0, 150.0, 4), "nonlinear"))
