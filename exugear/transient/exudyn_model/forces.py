@@ -141,7 +141,7 @@ def add_loads(parts: Parts, loads: LoadTable) -> None:
                 )
             )
     by_state: list[tuple[str, float, float, Callable[[float, float, float], float]]] = [
-        (body, 0.0, 0.0, lambda t, u, v, body=body: loads.torque_of_orders(body, u))
+        (body, 0.0, 0.0, _torque_over_angle(loads, body))
         for body in dict.fromkeys(order.body for order in loads.orders)
     ]
     if loads.drive is not None:
@@ -163,6 +163,10 @@ def add_loads(parts: Parts, loads: LoadTable) -> None:
 def _torque_function(torque: Callable[[float, float, float], float]) -> Callable[..., float]:
     """Return the force of a spring to the ground that is a torque over time, angle and speed."""
     return lambda mbs, t, item, u, v, k, d, offset: -torque(t, u, v)
+
+
+def _torque_over_angle(loads: LoadTable, body: str) -> Callable[[float, float, float], float]:
+    return lambda t, angle, speed: loads.torque_of_orders(body, angle)
 
 
 def _load_function(loads: LoadTable, body: str) -> Callable[[Any, float, float], float]:
