@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import combinations
+
 import numpy as np
 
 from exugear.system.bodies.matrix_files.interface import InterfaceMatrices
@@ -9,17 +12,16 @@ from exugear.system.bodies.matrix_files.interface import InterfaceMatrices
 POSITIONS = np.array([[0.0, 0.0, 0.0], [0.6, 0.1, 0.0], [0.5, 0.5, 0.3], [0.0, 0.4, 0.2]])
 NUMBERS = (12, 15, 101, 7)
 """Node numbers, in no order."""
-BEAMS = ((0, 1), (1, 2), (2, 3), (3, 0), (0, 2))
 STEEL, SHEAR, DENSITY = 210e9, 80e9, 7850.0
 SIDE = 0.08
 """Side of the square cross-section, m."""
 
 
-def beam_matrices(first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def beam_matrices(first: np.ndarray, second: np.ndarray, side: float = SIDE) -> tuple[np.ndarray, np.ndarray]:
     """Stiffness and consistent mass (12, 12) of an Euler-Bernoulli beam in space (Przemieniecki 1968, ch. 5 and 11)."""
     along = second - first
     length = float(np.linalg.norm(along))
-    area, moment, polar = SIDE**2, SIDE**4 / 12.0, SIDE**4 / 6.0
+    area, moment, polar = side**2, side**4 / 12.0, side**4 / 6.0
     stiffness, mass = np.zeros((12, 12)), np.zeros((12, 12))
     rod = np.array([[1.0, -1.0], [-1.0, 1.0]])
     linear = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
@@ -44,22 +46,32 @@ def beam_matrices(first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np
     return axes.T @ stiffness @ axes, axes.T @ mass @ axes
 
 
-def frame(modes: int = 2) -> InterfaceMatrices:
-    """Frame of beams in SI units, with as many modal coordinates of an inner mass on springs."""
-    size = 6 * len(NUMBERS)
+def beams_between(
+    positions: np.ndarray, numbers: Sequence[int], side: float = SIDE, modes: int = 0
+) -> InterfaceMatrices:
+    """Beams between all nodes in SI units; modal coordinates of unit mass, coupled by mass to the nodes."""
+    size = 6 * len(numbers)
     stiffness, mass = np.zeros((size + modes, size + modes)), np.zeros((size + modes, size + modes))
-    for first, second in BEAMS:
+    for first, second in combinations(range(len(numbers)), 2):
         at = np.r_[6 * first : 6 * first + 6, 6 * second : 6 * second + 6]
-        k, m = beam_matrices(POSITIONS[first], POSITIONS[second])
+        k, m = beam_matrices(positions[first], positions[second], side)
         stiffness[np.ix_(at, at)] += k
         mass[np.ix_(at, at)] += m
-    for mode in range(modes):  # modes of unit mass, coupled to the nodes by mass as fixed-interface modes are
+    rigid = InterfaceMatrices(tuple(numbers), positions, (), mass, stiffness).rigid_motions((0.0, 0.0, 0.0))[:size]
+    for mode in range(modes):
         stiffness[size + mode, size + mode] = (2.0 * np.pi * (300.0 + 400.0 * mode)) ** 2
         mass[size + mode, size + mode] = 1.0
-        coupling = 0.3 * np.sqrt(mass[6 * mode, 6 * mode])
-        mass[size + mode, 6 * mode] = mass[6 * mode, size + mode] = coupling
+        coupling = np.zeros(size)
+        coupling[6 * mode] = 0.3 * np.sqrt(mass[6 * mode, 6 * mode])
+        mass[size + mode, :size] = mass[:size, size + mode] = coupling
+    assert np.abs(stiffness[:size, :size] @ rigid).max() < 1e-9 * np.abs(stiffness).max()
     mass, stiffness = 0.5 * (mass + mass.T), 0.5 * (stiffness + stiffness.T)
-    return InterfaceMatrices(NUMBERS, POSITIONS, tuple(range(900_001, 900_001 + modes)), mass, stiffness)
+    return InterfaceMatrices(tuple(numbers), positions, tuple(range(900_001, 900_001 + modes)), mass, stiffness)
+
+
+def frame(modes: int = 2) -> InterfaceMatrices:
+    """Frame of four nodes."""
+    return beams_between(POSITIONS, NUMBERS, SIDE, modes)
 
 
 def sorted_frame(modes: int = 2) -> InterfaceMatrices:

@@ -174,9 +174,9 @@ def _chosen(
         )
     if name is None:
         known = ", ".join(others[:20]) or "none"
+        named = "" if stated is None else f" named {stated}"
         raise MatrixFileError(
-            f"{path}: no {kind} matrix named {' or '.join(candidates)}; matrices are {known}; set names.{kind} to the "
-            "name of one"
+            f"{path}: no {kind} matrix{named}; matrices are {known}; set {kind}_name to the name of one"
         )
     return found[name]
 
