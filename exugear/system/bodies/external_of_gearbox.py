@@ -13,6 +13,7 @@ from exugear.gearbox.named_files import LARGEST_MATRICES
 from exugear.gearbox.parts import Body
 from exugear.gearbox.sections.bodies import ExternalSeatSection, ExternalSection
 from exugear.gearbox.units import DEG, MM
+from exugear.system.bearings.stiffness import elastic_names
 from exugear.system.bodies.external import SAME_PLACE, ExternalModel, NodeSeat, matrices_of, placed_matrices
 from exugear.system.bodies.matrix_files.checks import MatrixReview
 from exugear.system.bodies.matrix_files.files import Kind, MatrixFiles
@@ -202,6 +203,24 @@ def _contradictions(gearbox: Gearbox, name: str, found: MatrixReview) -> Iterato
         if off > STATED_TOLERANCE * found.size:
             place = ", ".join(f"{1e3 * value:.5g}" for value in found.centre)
             yield f"stated_centre_mm: the matrices have their centre at ({place}) mm; check units and model"
+
+
+def external_facts(gearbox: Gearbox) -> Iterator[str]:
+    """Say what the matrices of each flexible body hold: coordinates, mass, centre and first mode.
+
+    These are the figures to compare with those that the other program lists.
+    """
+    for name in elastic_names(gearbox):
+        family = gearbox.body(name).family
+        if gearbox.case.bodies[family].external is None:
+            continue
+        matrices, found = matrices_of(external_body(gearbox, name).model)
+        centre = ", ".join(f"{1e3 * value:.4g}" for value in found.centre)
+        yield (
+            f"bodies.{family}.external: {len(matrices.nodes)} nodes, {len(matrices.modal)} modal coordinates, "
+            f"{found.mass:.5g} kg, centre of mass at ({centre}) mm in the axes of the files, first elastic mode of the "
+            f"free body at {found.first_frequency:.4g} Hz"
+        )
 
 
 def external_warnings(gearbox: Gearbox, name: str) -> Iterator[str]:

@@ -259,15 +259,16 @@ def punch_content(matrices: InterfaceMatrices, names: Mapping[str, str]) -> byte
     names : name of each matrix in the file, by "stiffness" and "mass"
     """
     lines = list(_grid_lines(matrices))
+    labels = matrices.labels
     for key, name in names.items():
         matrix = getattr(matrices, key)
         lines.append(f"DMIG    {name:<8}{0:8d}{SYMMETRIC:8d}{2:8d}{0:8d}{'':24}{matrices.size:8d}")
-        for column, (node, component) in enumerate(matrices.labels):
+        for column, (node, component) in enumerate(labels):
             rows = column + np.flatnonzero(matrix[column:, column])
             if not len(rows):
                 continue
             lines.append(f"DMIG*   {name:<16}{node:16d}{component:16d}")
             for row in rows:
-                other, with_component = matrices.labels[row]
+                other, with_component = labels[row]
                 lines.append(f"*       {other:16d}{with_component:16d}{nastran_real(matrix[row, column])}")
     return ("\n".join(lines) + "\n").encode()

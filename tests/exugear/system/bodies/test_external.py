@@ -397,7 +397,10 @@ def test_export_writes_what_the_gearbox_file_reads(tmp_path: Path) -> None:
     case.write_text(toml(content), encoding="utf-8")
     check = exugear("check", case, "--json")
     assert check.exit_code == 0, check.stderr
-    assert json.loads(check.stdout)["variants"]["flexible"] == ""
+    summary = json.loads(check.stdout)
+    assert summary["variants"]["flexible"] == ""
+    assert "bodies.box.external: 3 nodes" in summary["matrices"][0]
+    assert "0.58875 kg, centre of mass at (37.5, " in summary["matrices"][0]
     again = exugear("export", case, "--matrices", "box", "--format", "dmig", "--to", tmp_path)
     assert again.exit_code == 2
     assert "box.pch: exists already; specify another folder with --to" in again.stderr.replace("\n", " ")
