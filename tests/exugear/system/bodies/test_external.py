@@ -29,7 +29,7 @@ from exugear.system.statics import accelerating_start, static_state
 from exugear.system.system import Assembly, input_hash
 from exugear.transient.compiled.solver import CompiledSystem
 
-from ....optional_libraries import needs_meshio
+from ....optional_libraries import needs_gmsh, needs_meshio
 from ...cases.assembled import assembled, bodies_of
 from ...cases.beams import beams_between
 from ...cases.both_ways import assert_matrices_of_exudyn_are_those_of, compiled_states, exudyn_states, relative_error
@@ -171,6 +171,30 @@ def test_a_body_of_lumped_masses_moves_with_the_gearbox(tmp_path: Path) -> None:
     frequencies = modes_of(assembly).frequency
     assert np.isfinite(frequencies).all()
     assert frequencies.max() < 12000.0 * 1.01 + 1e4
+
+
+@pytest.mark.validation
+@pytest.mark.long
+@needs_gmsh
+@pytest.mark.parametrize("form", ["npz", "dmig"])
+def test_the_housing_of_the_grc_written_and_read_back_is_the_same_in_the_gearbox(
+    tmp_path: Path, grc: Gearbox, stiffness: dict[str, np.ndarray], form: MatrixFormat
+) -> None:
+    rigid = {f"bodies.{name}.flexibility": "none" for name in ("carrier", "lss", "ims", "hss")}
+    wanted = assembled(grc.varied(rigid), Choice("flexible"), stiffness)
+    body = wanted.elastic_bodies["housing"]
+    numbers = {seat.name: number for number, seat in enumerate(body.reduced.seats, start=1)}
+    sectors = {gear: {"sector_nodes": [numbers.pop(seat) for seat in seats]} for gear, seats in body.sectors.items()}
+    shared = {name: {"same_as": other} for name, other in body.shared_seats.items()}
+    content = copy.deepcopy(dict(grc.varied(rigid).content))
+    del content["bodies"]["housing"]["solid"]
+    content["bodies"]["housing"]["external"] = {
+        **write(tmp_path, interface_of(body.reduced), form),
+        "units": "SI",
+        "seats": {**sectors, **shared, **{name: {"node": number} for name, number in numbers.items()}},
+    }
+    found = assembled(Gearbox.from_dict(content, str(tmp_path / "case.toml")), Choice("flexible"), stiffness)
+    assert largest_change(found, wanted) < TOLERANCE.get(form, 1e-9)
 
 
 # Rotating bodies
