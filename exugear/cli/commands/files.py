@@ -161,6 +161,19 @@ def export(
             show_default=False,
         ),
     ] = None,
+    loads: Annotated[
+        Path | None,
+        typer.Option(
+            "--loads",
+            metavar="FILE.nc",
+            help="Write the forces of a steady-state response on the housing instead.",
+            show_default=False,
+        ),
+    ] = None,
+    speed: Annotated[
+        float | None,
+        typer.Option("--speed", metavar="RPM", help="Input speed of loads as Nastran cards.", show_default=False),
+    ] = None,
     form: Annotated[
         Literal["npz", "csv", "mtx", "op4", "dmig"],
         typer.Option(
@@ -188,7 +201,7 @@ def export(
     whole: options.AllOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Write results into a copy of a REXS file, or the matrices of a flexible body for finite-element programs.
+    """Write results into a copy of a REXS file, or matrices or loads for finite-element programs.
 
     In a REXS file, geometry and static forces are always written; tables, modes, bearings and runs if the results
     folder has them. Use --shifts and --distances of the import.
@@ -200,8 +213,13 @@ def export(
             raise BadInputError(f"--matrices {matrices}: omit {rexs}, which is for results in a REXS file")
         export_matrices(case, matrices, form, units, to, out, allow_dir, scripts, as_json, whole)
         return
+    if loads is not None:
+        from exugear.cli.tasks.interface_loads import export_loads
+
+        export_loads(case, loads, speed, to, allow_dir, as_json, whole)
+        return
     if rexs is None:
-        raise BadInputError("nothing to export; name a REXS file, or a flexible body with --matrices BODY")
+        raise BadInputError("nothing to export; name a REXS file, a body with --matrices BODY, or --loads FILE.nc")
     from exugear.cli.tasks.rexs import export_rexs
     from exugear.exchange.rexs.to_case.notes import Rules
 

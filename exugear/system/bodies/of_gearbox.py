@@ -28,7 +28,7 @@ from exugear.gearbox.sections.gears import MaterialSection
 from exugear.gearbox.units import MM, optional_si, si
 from exugear.system.bearings.stiffness import elastic_names, mounts_at_work
 from exugear.system.bodies.elastic_body import ElasticBody, FloatingBody
-from exugear.system.bodies.external import ExternalModel, reduce_external
+from exugear.system.bodies.external import ExternalModel, placed_matrices, reduce_external
 from exugear.system.bodies.external_of_gearbox import ExternalBody, check_external, external_body
 from exugear.system.bodies.matrix_files.interface import MatrixFileError
 from exugear.system.bodies.reduction import Blank, ReducedBody, ReductionError, RigidInertia, with_rigid_inertia
@@ -375,6 +375,31 @@ def _solid_blanks(gearbox: Gearbox, body: Body, solid: SolidSection, names: list
             raise gearbox.error(f"bodies.{body.family}.solid.blanks.{name}: no such seat; seats are {', '.join(names)}")
         blanks |= dict.fromkeys(on, blank_of(section))
     return blanks
+
+
+def node_numbers(gearbox: Gearbox, name: str) -> dict[str, int]:
+    """Return the node number of each seat of a flexible body in files for other programs.
+
+    A body from matrices keeps their numbers; the seats of a solid are numbered from 1.
+
+    Raises
+    ------
+    GearboxFileError
+        As `external_body` and `solid_body`.
+    exugear.system.bodies.matrix_files.interface.MatrixFileError, ReductionError
+        The matrices cannot be used.
+    """
+    section = gearbox.case.bodies[gearbox.body(name).family]
+    if section.external is not None:
+        external = external_body(gearbox, name)
+        names = [seat.name for seat in external.model.seats]
+        numbers = dict(zip(names, placed_matrices(external.model).nodes, strict=False))
+        shared = external.shared_seats
+    else:
+        solid = solid_body(gearbox, name)
+        numbers = {seat.name: number for number, seat in enumerate(solid.model.seats, start=1)}
+        shared = solid.shared_seats
+    return numbers | {seat: numbers[other] for seat, other in shared.items()}
 
 
 def solids_of(gearbox: Gearbox) -> Iterator[tuple[str, SolidModel]]:

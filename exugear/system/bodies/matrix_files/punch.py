@@ -238,10 +238,23 @@ def nastran_real(value: float) -> str:
     raise ValueError(f"{value!r} has no notation in {_FIELD} columns")
 
 
+def nastran_decimal(value: float) -> str:
+    """Return a number in 16 columns as single-precision fields take it: without the D of double precision.
+
+    Examples
+    --------
+    >>> nastran_decimal(-1234.5678901234), nastran_decimal(2.5e-7)
+    ('-1234.5678901234', ' 2.500000000E-07')
+    """
+    if 1e-3 <= abs(value) < 1e9:
+        return f"{value:.{14 - len(str(int(abs(value))))}f}"[:_FIELD].rjust(_FIELD)
+    return f"{value:.9E}".rjust(_FIELD)
+
+
 def _grid_lines(matrices: InterfaceMatrices) -> Iterator[str]:
     for node, (x, y, z) in zip(matrices.nodes, matrices.positions.tolist(), strict=True):
-        yield f"GRID*   {node:16d}{0:16d}{nastran_real(x)}{nastran_real(y)}"
-        yield f"*       {nastran_real(z)}{0:16d}"
+        yield f"GRID*   {node:16d}{0:16d}{nastran_decimal(x)}{nastran_decimal(y)}"
+        yield f"*       {nastran_decimal(z)}{0:16d}"
     for number in matrices.modal:
         yield f"SPOINT  {number:8d}"
 

@@ -22,6 +22,7 @@ from exugear.system.bodies.external import interface_of
 from exugear.system.bodies.external_of_gearbox import check_external, external_warnings
 from exugear.system.bodies.matrix_files.files import MatrixFormat, file_contents, keys_of
 from exugear.system.bodies.matrix_files.interface import InterfaceMatrices
+from exugear.system.bodies.of_gearbox import node_numbers
 from exugear.system.bodies.reduction import ReducedBody, selective_mass_scaling
 from exugear.system.loads import LoadTable
 from exugear.system.modes import modes_of
@@ -375,6 +376,17 @@ def test_what_an_rbe2_does_and_what_is_unusual_is_said(tmp_path: Path, box: Inte
     assert any("check units" in line for line in external_warnings(wrong, "box"))
 
 
+def test_loads_and_matrices_have_the_same_node_numbers(tmp_path: Path, box: InterfaceMatrices) -> None:
+    content = box_content(tmp_path)
+    assert node_numbers(Gearbox.from_dict(content, str(tmp_path / "case.toml")), "box") == {
+        "bearing_1": 1, "bearing_2": 2, "foot": 3,
+    }  # fmt: skip
+    renumbered = InterfaceMatrices((70, 8, 55), box.positions, box.modal, box.mass, box.stiffness)
+    seats = {"bearing_1": {"node": 70}, "bearing_2": {"same_as": "bearing_1"}, "foot": {"node": 55}}
+    gearbox = box_of(tmp_path, {**write(tmp_path, renumbered), "seats": seats})
+    assert node_numbers(gearbox, "box") == {"bearing_1": 70, "bearing_2": 70, "foot": 55}
+
+
 def test_other_files_are_other_results(tmp_path: Path, box: InterfaceMatrices) -> None:
     hashes = []
     for factor in (1.0, 1.01):
@@ -435,7 +447,7 @@ def test_export_writes_what_the_gearbox_file_reads(tmp_path: Path) -> None:
     [
         (("--matrices", "lid"), "--matrices lid: no such flexible body; flexible bodies are box"),
         (("--matrices", "box", "file.rexs"), "--matrices box: omit file.rexs"),
-        ((), "nothing to export; name a REXS file, or a flexible body with --matrices BODY"),
+        ((), "nothing to export; name a REXS file, a body with --matrices BODY, or --loads FILE.nc"),
     ],
 )
 def test_an_export_that_cannot_be_is_refused_and_writes_nothing(
