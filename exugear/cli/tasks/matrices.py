@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import get_args
 
 from exugear.cli.case import open_project
 from exugear.cli.console import BadInputError
@@ -13,7 +12,7 @@ from exugear.results.findings import Finding
 from exugear.system.bearings.stiffness import elastic_names
 from exugear.system.bodies.external import interface_of
 from exugear.system.bodies.matrix_files.files import MatrixFormat, file_contents, keys_of
-from exugear.system.bodies.matrix_files.interface import UNIT_SYSTEMS, UnitSystemName
+from exugear.system.bodies.matrix_files.interface import UnitSystemName
 from fe_ste.tools.files import write_file
 
 FOLDER = "matrices"
@@ -34,10 +33,6 @@ def export_matrices(
     whole: bool,
 ) -> None:
     """Write the matrices of a flexible body of the variant `flexible`."""
-    if form not in get_args(MatrixFormat):
-        raise BadInputError(f"--format {form}: no such format; choose one of {', '.join(get_args(MatrixFormat))}")
-    if units not in UNIT_SYSTEMS:
-        raise BadInputError(f"--units {units}: no such unit system; choose one of {', '.join(UNIT_SYSTEMS)}")
     project = open_project(case, out, allow_dir, scripts, Variant.flexible)
     flexible = elastic_names(project.gearbox)
     if body not in flexible:

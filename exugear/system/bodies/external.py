@@ -16,7 +16,6 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property, lru_cache
 
@@ -239,32 +238,24 @@ def marked_nodes(positions: Floats, size: int) -> BodySurface:
     )
 
 
-def interface_of(body: ReducedBody, numbers: Sequence[int] | None = None) -> InterfaceMatrices:
+def interface_of(body: ReducedBody) -> InterfaceMatrices:
     """Return mass and stiffness of a reduced body on its seats, for other programs; in SI units.
 
-    Modes above the limit of the body are at this limit.
-
-    Parameters
-    ----------
-    numbers : node number of each seat; by default from 1
+    Nodes are numbered from 1 in the order of the seats. Modes above the limit of the body are at this limit.
 
     Examples
     --------
-    >>> from exugear.gearbox.gearbox import Gearbox
-    >>> from exugear.system.bodies.of_gearbox import reduced_bodies
-    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
-    >>> shafts = gearbox.varied({f"bodies.{name}.flexibility": "none" for name in ("housing", "carrier")})
-    >>> body = reduced_bodies(shafts, "assemblies")["hss"].reduced
+    >>> seats = (Seat("left", (1.0, 0.0, 0.0)), Seat("right", (0.0, 1.0, 0.0)))
+    >>> surface, summary = marked_nodes(np.eye(2, 3), 12), ReductionSummary({}, 0.0, {}, {})
+    >>> none = np.zeros((12, 12))
+    >>> body = ReducedBody("lid", seats, np.eye(12), none, none, np.zeros(12), "ground", (), surface, summary)
     >>> interface_of(body)
-    <InterfaceMatrices: 5 interface nodes, ...
+    <InterfaceMatrices: 2 interface nodes, 0 modal coordinates>
     """
-    nodes = tuple(numbers or range(1, len(body.seats) + 1))
-    modal = len(body.modal_groups)
-    first = max(FIRST_MODAL, max(nodes) + 1)
     return InterfaceMatrices(
-        nodes=nodes,
+        nodes=tuple(range(1, len(body.seats) + 1)),
         positions=np.array([seat.position for seat in body.seats]),
-        modal=tuple(range(first, first + modal)),
+        modal=tuple(range(FIRST_MODAL, FIRST_MODAL + len(body.modal_groups))),
         mass=body.mass,
         stiffness=body.stiffness,
     )

@@ -50,7 +50,7 @@ Label = tuple[int, int]
 """Node number and component 1 to 6 of a coordinate; component 0 is a scalar point."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LabelledMatrix:
     """A symmetric matrix as it is in a file."""
 
@@ -60,9 +60,9 @@ class LabelledMatrix:
     """(n,) coordinates; None for a file without any, where the node table states their order."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class NodeTable:
-    """Interface nodes in a file, which has no matrices or some."""
+    """Interface nodes of a file."""
 
     positions: Mapping[int, tuple[float, float, float]] = field(default_factory=dict)
     """By node number, in the unit of length of the file."""
@@ -72,7 +72,7 @@ class NodeTable:
     """Coordinates of matrices without labels."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class InterfaceMatrices(ReprMixin, line=": {nodes!n} interface nodes, {modal!n} modal coordinates"):
     """Mass and stiffness of a free body on interface nodes; n = 6 s + m coordinates of s nodes and m modes.
 

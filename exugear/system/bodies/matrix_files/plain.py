@@ -131,7 +131,7 @@ def _array(archive: zipfile.ZipFile, name: str, length: int, path: Path) -> NDAr
 
 
 def _square(values: NDArray[Any], name: str, path: object) -> NDArray[np.float64]:
-    """Check that a matrix is square and finite."""
+    """Return a matrix in double precision, which must be square and finite."""
     if values.ndim != 2 or values.shape[0] != values.shape[1]:
         raise MatrixFileError(f"{path}: matrix {name} has the shape {values.shape}; expected a square matrix")
     matrix = values.astype(np.float64)
