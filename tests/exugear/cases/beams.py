@@ -40,7 +40,7 @@ def beam_matrices(first: np.ndarray, second: np.ndarray, side: float = SIDE) -> 
         )
         sign = -1.0
     x = along / length
-    y = np.cross([0.0, 0.0, 1.0], x)
+    y = np.cross([0.0, 0.0, 1.0] if abs(x[2]) < 0.9 else [0.0, 1.0, 0.0], x)
     y /= np.linalg.norm(y)
     axes = np.kron(np.eye(4), np.array([x, y, np.cross(x, y)]))
     return axes.T @ stiffness @ axes, axes.T @ mass @ axes

@@ -243,6 +243,33 @@ def test_gyroscopic_forces_of_a_shaft_follow_from_its_torsional_inertia(tmp_path
     assert any("gyroscopic forces follow" in line for line in external_warnings(gearbox, "shaft_1"))
 
 
+@pytest.mark.parametrize(
+    ("places", "message"),
+    [
+        ([[0.0, 0.0, -0.04], [0.0, 0.0, 0.02], [0.1, 0.0, 0.0]], "a seat is 100 mm off the axis, but 'nonrotating'"),
+        ([[0.0, 0.0, -0.04], [1e-7, 0.0, 0.02], [0.0, 1e-7, 0.06]], "a rotation by 90 degrees changes its stiffness"),
+    ],
+)
+def test_a_shaft_that_is_no_body_of_revolution_is_refused(
+    tmp_path: Path, places: list[list[float]], message: str
+) -> None:
+    beams = beams_between(np.array(places), (1, 2, 3), 0.03)
+    stiffness = beams.stiffness.copy()
+    if places[2][0] == 0.0:  # as if its cross-section was flat: bending is softer about one axis
+        for bent in (1, 3):
+            at = np.arange(bent, 18, 6)
+            stiffness[at] *= 0.8
+            stiffness[:, at] *= 0.8
+    content = shaped_shafts()
+    del content["bodies"]["shaft_1"]["shape"], content["forces"]
+    body = InterfaceMatrices(beams.nodes, beams.positions, (), beams.mass, stiffness)
+    content["bodies"]["shaft_1"]["external"] = {
+        **write(tmp_path, body), "units": "SI", "seats": {"pinion": {"node": 2}, "bearing_1": {"node": 1}},
+    }  # fmt: skip
+    with pytest.raises(GearboxFileError, match=message):
+        bodies_of(Gearbox.from_dict(content, str(tmp_path / "case.toml")), Choice("flexible"))
+
+
 def ring_of_beams() -> InterfaceMatrices:
     """Nodes 101 to 109 around a ring, referred to its centre by rigid arms, and nodes 1 and 2 at its front and rear."""
     centre = np.array([0.0, 0.0, MIDDLE])
