@@ -20,6 +20,7 @@ from dataclasses import asdict, dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
+import scipy.linalg
 
 from exugear.system.bodies.matrix_files.checks import MatrixReview, review
 from exugear.system.bodies.matrix_files.files import MatrixFiles, read_matrices
@@ -213,27 +214,40 @@ def _gyroscopic_matrix(matrices: InterfaceMatrices, frame: Frame) -> Floats:
     return gyroscopic - gyroscopic.T
 
 
-def marked_nodes(positions: Floats, size: int) -> BodySurface:
-    """Surface of small octahedra at nodes (s, 3), which move with them as rigid bodies; `size` coordinates.
+_OCTAHEDRON = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])
+_TRIANGLES = np.array([[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]])
+_SQUARE = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
 
-    Without the mesh of the other program, pictures show the interface alone, and no strain energy.
+
+def marked_nodes(positions: Floats, size: int) -> BodySurface:
+    """Surface of small octahedra at nodes (s, 3), and bars between neighbours; `size` coordinates.
+
+    Without the mesh of the other program, pictures show the interface alone, and no strain energy. Corners move with
+    their node as with a rigid body. The bars are those of the shortest tree that joins all nodes.
     """
+    from scipy.sparse.csgraph import minimum_spanning_tree  # loaded only for such bodies
+
     radius = MARK * max(float(np.ptp(positions, axis=0).max()), MARK)
-    corners = radius * np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])
-    triangles = np.array([[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]])
-    displacement = np.zeros((len(positions), len(corners), 3, size), dtype=np.float32)
-    for number in range(len(positions)):
-        for corner, (x, y, z) in enumerate(corners):
-            at = displacement[number, corner, :, 6 * number : 6 * number + 6]
-            at[:, :3] = np.eye(3)
-            at[:, 3:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
-    faces = np.column_stack([triangles, triangles[:, 2]])
-    quads = (faces[None] + len(corners) * np.arange(len(positions))[:, None, None]).reshape(-1, 4)
+    points = [(node, radius * corner) for node in range(len(positions)) for corner in _OCTAHEDRON]
+    faces = [
+        [*(6 * node + triangle), 6 * node + triangle[2]] for node in range(len(positions)) for triangle in _TRIANGLES
+    ]
+    distances = np.linalg.norm(positions[:, None] - positions, axis=2)
+    tree = minimum_spanning_tree(distances)
+    for first, second in np.argwhere(tree.toarray() > 0.0).tolist():
+        across = scipy.linalg.null_space((positions[second] - positions[first])[None]).T
+        start = len(points)
+        points += [(node, 0.4 * radius * corner @ across) for node in (first, second) for corner in _SQUARE]
+        faces += [[start + n, start + (n + 1) % 4, start + 4 + (n + 1) % 4, start + 4 + n] for n in range(4)]
+    displacement = np.zeros((len(points), 3, size), dtype=np.float32)
+    for number, (node, (x, y, z)) in enumerate(points):
+        displacement[number, :, 6 * node : 6 * node + 3] = np.eye(3)
+        displacement[number, :, 6 * node + 3 : 6 * node + 6] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
     return BodySurface(
-        points=(positions[:, None] + corners).reshape(-1, 3),
-        quads=quads.astype(np.int64),
-        displacement=displacement.reshape(-1, 3, size),
-        strain=np.zeros((len(quads), 6, size), dtype=np.float32),
+        points=np.array([positions[node] + offset for node, offset in points]),
+        quads=np.array(faces, dtype=np.int64),
+        displacement=displacement,
+        strain=np.zeros((len(faces), 6, size), dtype=np.float32),
         elasticity=np.zeros((6, 6)),
     )
 

@@ -425,10 +425,14 @@ def test_other_files_are_other_results(tmp_path: Path, box: InterfaceMatrices) -
 def test_pictures_show_the_nodes(tmp_path: Path, box: InterfaceMatrices) -> None:
     assembly = assembled(box_of(tmp_path, write(tmp_path, box)), Choice("flexible"), STIFFNESS)
     surface = assembly.elastic_bodies["box"].reduced.surface
-    assert surface.points.reshape(3, 6, 3).mean(axis=1) == pytest.approx(box.positions)
+    assert surface.points[:18].reshape(3, 6, 3).mean(axis=1) == pytest.approx(box.positions)
+    # Bars from the foot, at (50, 0, -12) mm, to both bearings: 51.4 and 27.7 mm are shorter than 75 mm.
+    ends = surface.points[18:].reshape(2, 2, 4, 3).mean(axis=2)
+    assert sorted(np.linalg.norm(np.diff(ends, axis=1)[:, 0], axis=1)) == pytest.approx([0.02773, 0.05142], abs=1e-5)
     rigid = surface.displacement @ assembly.elastic_bodies["box"].reduced.rigid_motions((0.0, 0.0, 0.0))
     assert rigid[:, :, 5] == pytest.approx(np.cross([0.0, 0.0, 1.0], surface.points), abs=1e-7)
-    assert len(elastic_scene(assembly, modes_of(assembly).shapes[:, 3]).bodies) == 1
+    scene = elastic_scene(assembly, modes_of(assembly).shapes[:, 3])
+    assert len(scene.bodies[0].quads) == 3 * 8 + 2 * 4  # seen from every side
 
 
 # Command line
