@@ -30,6 +30,7 @@ QUICK = ("catalogue_bearings", "python", "untrusted_files")
 LONG = (
     "damping",
     "drive_with_duty_cycle",
+    "external_housing",
     "flanks_and_deviations",
     "flexible_bodies",
     "lubricant",

@@ -93,10 +93,7 @@ class WatchedProject(Project):
         with self.bars.row():
             modes = super().modes()
         for name, body in modes.assembly.elastic_bodies.items():
-            figures = body.reduced.summary
-            unknowns = sum(figures.unknowns.values())
-            took = figures.seconds
-            note(f"{name}: {unknowns} unknowns reduced to {body.reduced.size} coordinates in {took:.1f} s")
+            note(f"{name}: {body.reduced.origin} in {body.reduced.summary.seconds:.1f} s")
         return modes
 
     def duties(self) -> tuple[tuple[BearingLoadState, ...], tuple[MeshLoadState, ...]]:

@@ -13,7 +13,6 @@ from __future__ import annotations
 import csv
 import hashlib
 import os
-import re
 import struct
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
@@ -25,6 +24,7 @@ import numpy as np
 from exugear.exchange.channels import Channels, LoadFileError, Read
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.files import FileError, open_regular
+from fe_ste.tools.numbers import fortran_number
 
 # Lines of a text of any length, in blocks, so that no whole file is in memory
 
@@ -115,27 +115,6 @@ def numbers(
             yield rows
     if not some:
         raise LoadFileError(f"{path}: no lines of numbers under its headings")
-
-
-FORTRAN_NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[dDqQ]?)([+-]\d{1,3})")
-"""A number in Fortran notation, with a three-digit exponent without E, or with D for E."""
-
-
-def fortran_number(word: str) -> float:
-    """Return the number in a word, including Fortran notation.
-
-    Raises
-    ------
-    ValueError
-        The word is not a number.
-
-    Examples
-    --------
-    >>> fortran_number("1.2345-101"), fortran_number("-4.5D+02"), fortran_number("7")
-    (1.2345e-101, -450.0, 7.0)
-    """
-    found = FORTRAN_NUMBER.fullmatch(word)
-    return float(f"{found[1]}e{found[2]}") if found is not None else float(word)
 
 
 @dataclass(frozen=True)

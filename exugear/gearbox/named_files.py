@@ -13,6 +13,8 @@ LARGEST_CASE = 10_000_000
 """Maximum size of a gearbox file, bytes."""
 LARGEST_TABLE = 100_000_000
 """Maximum size of a table of numbers (measured flank, torque series), bytes."""
+LARGEST_MATRICES = 500_000_000
+"""Maximum size of a file of matrices, bytes; those of the largest permitted bodies have 230 MB as a table."""
 LARGEST_SOLID = 1_000_000_000
 """Maximum size of a solid, bytes."""
 

@@ -21,6 +21,7 @@ from exugear.system.bearings.rolling.catalogue import catalogue_rows
 from exugear.system.bearings.rolling.friction import friction_series
 from exugear.system.bearings.rolling.rows import BearingError
 from exugear.system.bearings.stiffness import elastic_names, linear_law, misplaced_factor, mounts_at_work, unsupported
+from exugear.system.bodies.external_of_gearbox import external_warnings
 from exugear.system.bodies.of_gearbox import check_elastic_body, check_shape, narrowed_seats
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.system.part_warnings import pair_warnings, part_warnings
@@ -246,8 +247,11 @@ def gearbox_warnings(gearbox: Gearbox) -> tuple[str, ...]:
     lines += pair_warnings(gearbox)
     lines += part_warnings(gearbox)
     for name in elastic_names(gearbox):
-        if gearbox.case.bodies[gearbox.body(name).family].solid is None:
+        section = gearbox.case.bodies[gearbox.body(name).family]
+        if section.shape is not None:
             lines += narrowed_seats(gearbox, name)
+        if section.external is not None:
+            lines += external_warnings(gearbox, name)
     return tuple(dict.fromkeys(lines))
 
 

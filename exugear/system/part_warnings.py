@@ -18,7 +18,7 @@ from exugear.gearbox.load_cases import operating_range, summarise_loads
 from exugear.gearbox.parts import Bearing, Body, PairSpec
 from exugear.gearbox.sections.designations import boundary_of
 from exugear.gearbox.units import MM, RPM, si
-from exugear.system.bodies.of_gearbox import seat_width
+from exugear.system.bodies.seated_items import seat_width
 from fe_ste.geometry.checks import USUAL_TIP_THICKNESS
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.standards.pitting import nominal_contact_stress

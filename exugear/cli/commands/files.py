@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -147,27 +147,79 @@ def check(
 def export(
     case: options.CaseArgument,
     rexs: Annotated[
-        Path,
+        Path | None,
         typer.Argument(
             metavar="FILE.rexs", help="REXS file that the gearbox file was imported from.", show_default=False
         ),
-    ],
+    ] = None,
+    matrices: Annotated[
+        str | None,
+        typer.Option(
+            "--matrices",
+            metavar="BODY",
+            help="Write mass and stiffness of a flexible body instead, on its seats.",
+            show_default=False,
+        ),
+    ] = None,
+    loads: Annotated[
+        Path | None,
+        typer.Option(
+            "--loads",
+            metavar="FILE.nc",
+            help="Write the forces of a steady-state response on the housing instead.",
+            show_default=False,
+        ),
+    ] = None,
+    speed: Annotated[
+        float | None,
+        typer.Option("--speed", metavar="RPM", help="Input speed of loads as Nastran cards.", show_default=False),
+    ] = None,
+    form: Annotated[
+        Literal["npz", "csv", "mtx", "op4", "dmig"],
+        typer.Option(
+            "--format", metavar="NAME", help="Format of matrices: npz, csv, mtx (Abaqus), op4, dmig (Nastran)."
+        ),
+    ] = "npz",
+    units: Annotated[
+        Literal["SI", "mm-t-s", "mm-kg-ms", "mm-kg-s", "inch-lbf-s"],
+        typer.Option("--units", metavar="NAME", help="Units of matrices: SI, mm-t-s, mm-kg-ms, mm-kg-s, inch-lbf-s."),
+    ] = "SI",
     to: Annotated[
         Path | None,
-        typer.Option("--to", metavar="FILE", help="File to write. (default: NAME-exugear, same folder as FILE.rexs)"),
+        typer.Option(
+            "--to",
+            metavar="PATH",
+            help="File to write (default: NAME-exugear, same folder as FILE.rexs), or folder for matrices (default: "
+            "matrices in the results folder).",
+        ),
     ] = None,
     out: options.OutOption = None,
     allow_dir: options.FilesBelowOption = None,
+    scripts: options.ScriptsOption = False,
     shifts: options.ShiftsOption = "file",
     distances: options.DistancesOption = "agreeing",
     whole: options.AllOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Write results into a copy of a REXS file. They are REXS attributes where possible, else custom_exugear ones.
+    """Write results into a copy of a REXS file, or matrices or loads for finite-element programs.
 
-    Geometry and static forces are always written; tables, modes, bearings and runs if the results folder has them. Use
-    --shifts and --distances of the import.
+    In a REXS file, geometry and static forces are always written; tables, modes, bearings and runs if the results
+    folder has them. Use --shifts and --distances of the import.
     """
+    if matrices is not None:
+        from exugear.cli.tasks.matrices import export_matrices
+
+        if rexs is not None:
+            raise BadInputError(f"--matrices {matrices}: omit {rexs}, which is for results in a REXS file")
+        export_matrices(case, matrices, form, units, to, out, allow_dir, scripts, as_json, whole)
+        return
+    if loads is not None:
+        from exugear.cli.tasks.interface_loads import export_loads
+
+        export_loads(case, loads, speed, to, allow_dir, as_json, whole)
+        return
+    if rexs is None:
+        raise BadInputError("nothing to export; name a REXS file, a body with --matrices BODY, or --loads FILE.nc")
     from exugear.cli.tasks.rexs import export_rexs
     from exugear.exchange.rexs.to_case.notes import Rules
 

@@ -25,6 +25,7 @@ from exugear.project import default_folder
 from exugear.results.findings import Finding
 from exugear.results.folder import duty_summary
 from exugear.system.bearings.duty import estimate_effects
+from exugear.system.bodies.external_of_gearbox import external_facts
 from exugear.system.bodies.of_gearbox import solids_of
 from exugear.system.gearbox_checks import gearbox_warnings, lacking
 from exugear.system.modes import modes_of, unusual_damping
@@ -47,7 +48,7 @@ def check(case: Path, allow_dir: Path | None, as_json: bool, whole: bool) -> Non
         summary=summary,
         tables=check_tables(gearbox.case.overall.input, summary),
         findings=[Finding("warning", line) for line in warnings],
-        remarks=availability(summary),
+        remarks=[*summary["matrices"], *availability(summary)],
     ).show(as_json, whole)
 
 
@@ -99,6 +100,7 @@ def summarise(gearbox: Gearbox) -> dict[str, Any]:
         "load_cases": loads,
         "variants": variants,
         "steady": _steady_lacks(assemblies),
+        "matrices": list(external_facts(gearbox)),
         "life": {verb: list(reasons) for verb, reasons in missing_for_life(gearbox).items()},
         "warnings": [*gearbox_warnings(gearbox), *doubts, *_damping_warnings(assemblies)],
     }

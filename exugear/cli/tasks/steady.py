@@ -75,7 +75,8 @@ def check_radiating_body(project: Project) -> None:
     if not radiating_names(project.gearbox, project.choice.variant):
         raise BadInputError(
             f"--quantity sound_power: the variant {project.choice.variant} has no flexible housing; use --variant "
-            'flexible, and give a fixed body a [bodies.NAME.solid] table and flexibility = "elastic"'
+            'flexible, and give a fixed body a [bodies.NAME.solid] table and flexibility = "elastic" '
+            "([bodies.NAME.external] has no surface)"
         )
 
 

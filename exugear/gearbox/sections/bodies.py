@@ -1,4 +1,4 @@
-"""Sections on bodies: position, inertia, and the shape or solid that makes them flexible."""
+"""Sections on bodies: position, inertia, and the shape, solid or matrices that make them flexible."""
 
 from __future__ import annotations
 
@@ -166,11 +166,88 @@ class SolidSection(Section):
     """Rigid rings at its seats, by seat."""
 
 
+class ExternalSeatSection(Section):
+    """Interface node of a gear, bearing or mount, for a body from matrices.
+
+    By default it is the only node at the position of the gear, bearing or mount. `sector_nodes` are the equal sectors
+    of an internal gear, each the mean motion of its sector about the centre of the gear. `same_as` names the seat of
+    another bearing in the same bore.
+    """
+
+    node: q.NodeNumber | None = None
+    """Number of the node."""
+    position_mm: Point | None = None
+    """Position at which the node is looked for, in the coordinates of the gearbox."""
+    sector_nodes: Annotated[tuple[q.NodeNumber, ...], Field(strict=False, max_length=63)] = ()
+    """Numbers of the nodes of equal sectors, an odd number, the first about +x, then on towards +y."""
+    same_as: Name | None = None
+    """Seat of another bearing in the same bore; cannot be combined with other keys."""
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> ExternalSeatSection:
+        if len(self.model_fields_set) > 1:
+            raise ValueError("set one of node, position_mm, sector_nodes and same_as")
+        count = len(self.sector_nodes)
+        if "sector_nodes" in self.model_fields_set and (count < 3 or count % 2 == 0):
+            raise ValueError("sector_nodes must be an odd number of at least 3, so that interpolation is smooth")
+        if len(set(self.sector_nodes)) < count:
+            raise ValueError("sector_nodes has a node twice")
+        return self
+
+
+class ExternalSection(Section):
+    """A body of another finite-element program as mass and stiffness matrices on interface nodes.
+
+    The files are in the folder of the gearbox file: one with both matrices, or `stiffness` and `mass`; formats follow
+    from their endings (.npz, .csv, .mtx, .op4, .pch, .bdf). The body is free, without supports. Its coordinates become
+    those of the gearbox by `turn_deg`, then `shift_mm`.
+    """
+
+    file: FileName | None = None
+    """File with both matrices."""
+    stiffness: FileName | None = None
+    """File with the stiffness matrix."""
+    mass: FileName | None = None
+    """File with the mass matrix."""
+    nodes: FileName | None = None
+    """File with the positions of the nodes (.csv, .inp, .npz, .pch, .bdf), if the matrices have none."""
+    stiffness_name: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,15}$")] | None = None
+    """Name of the stiffness matrix in a Nastran file; by default `KAAX` or another usual name."""
+    mass_name: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,15}$")] | None = None
+    """Name of the mass matrix in a Nastran file; by default `MAAX` or another usual name."""
+    units: Literal["SI", "mm-t-s", "mm-kg-ms", "mm-kg-s", "inch-lbf-s"]
+    """Unit system of the files: length, mass (with `inch-lbf-s` force), time."""
+    shift_mm: Point = (0.0, 0.0, 0.0)
+    """Position of the origin of the files in the gearbox."""
+    turn_deg: Annotated[tuple[q.AngleDeg, q.AngleDeg, q.AngleDeg], Field(strict=False)] = (0.0, 0.0, 0.0)
+    """Rotations about the axes x, y and z of the gearbox, in this order."""
+    constraint: Literal["rbe2", "rbe3"] | None = None
+    """How interface nodes are connected to their surfaces; `rbe2` makes seats too stiff, which is stated with results.
+    """
+    torque_seat: Name | None = None
+    """Seat at which torques act."""
+    stated_mass_kg: q.MassKg | None = None
+    """Mass according to the other program, which is compared."""
+    stated_centre_mm: Point | None = None
+    """Centre of mass according to the other program in the axes of the files, which is compared."""
+    seats: dict[Name, ExternalSeatSection] = {}
+    """Seats by gear, bearing or mount."""
+
+    @model_validator(mode="after")
+    def _files(self) -> ExternalSection:
+        apart = (self.stiffness is not None, self.mass is not None)
+        if self.file is not None and any(apart):
+            raise ValueError("set either file, or stiffness and mass")
+        if self.file is None and not all(apart):
+            raise ValueError("requires its matrices; set file, or stiffness and mass")
+        return self
+
+
 class BodySection(Section):
     """A rigid body rotating about +z, a set of equal planets, a spin-only inertia or a fixed housing.
 
-    `flexibility` selects the model of the body in the variant `flexible`. "elastic" uses its shape or solid in a
-    suitable frame: stationary for a fixed body, rotating with a planet carrier, and non-rotating for all others.
+    `flexibility` selects the model of the body in the variant `flexible`. "elastic" uses its shape, solid or matrices
+    in a suitable frame: stationary for a fixed body, rotating with a planet carrier, and non-rotating for all others.
     "nonrotating" requires the latter and is refused for fixed bodies and carriers, as is "ffrf", a floating frame
     (Exudyn only).
     """
@@ -201,13 +278,26 @@ class BodySection(Section):
     """Stepped shaft, for a flexible body."""
     solid: SolidSection | None = None
     """Solid of arbitrary shape, for a flexible body."""
+    external: ExternalSection | None = None
+    """Matrices of another finite-element program, for a flexible body."""
 
     @model_validator(mode="after")
     def _place(self) -> BodySection:
-        if self.shape is not None and self.solid is not None:
-            raise ValueError("set a shape or a solid, not both")
-        if self.flexibility != "none" and self.shape is None and self.solid is None:
-            raise ValueError(f"flexibility {self.flexibility!r} requires a shape; add a [.shape] or a [.solid] table")
+        if [self.shape, self.solid, self.external].count(None) < 2:
+            raise ValueError("set one of shape, solid and external")
+        if self.flexibility != "none" and [self.shape, self.solid, self.external].count(None) == 3:
+            raise ValueError(
+                f"flexibility {self.flexibility!r} requires a shape; add a [.shape], [.solid] or [.external] table"
+            )
+        if self.external is not None and self.flexibility == "ffrf":
+            raise ValueError(
+                "flexibility 'ffrf' requires mass integrals, which matrices on nodes do not have; set 'elastic'"
+            )
+        if self.external is not None and (self.spin_only or self.carrier is not None):
+            raise ValueError(
+                "external matrices are for a body on a fixed axis or a fixed body, not a spin-only or planet body; "
+                "describe it by its inertia"
+            )
         if self.flexibility in ("nonrotating", "ffrf") and self.fixed:
             raise ValueError(f"flexibility {self.flexibility!r} is for rotating bodies; set 'elastic' for a fixed body")
         if self.shape is not None and (self.fixed or self.spin_only or self.carrier is not None):

@@ -97,6 +97,7 @@ LengthUnitMm = Annotated[float, Range(1e-3, 1e3, why="1 for millimetres, 1000 fo
 ElementSizeMm = Annotated[float, Range(0.2, 5000.0, (1.0, 500.0), "finer meshes fill any memory")]
 ElementsAround = Annotated[int, Range(6, 400, (6, 120), "finer meshes fill any memory")]
 Sectors = Annotated[int, Range(3, 63, (3, 31), "each is a seat of six coordinates")]
+NodeNumber = Annotated[int, Range(-(10**9), 10**9, why="numbers of nodes in a finite-element model")]
 AngleDeg = Annotated[float, Range(-3600.0, 3600.0, (-720.0, 720.0))]
 ShaftOrder = Annotated[int, Range(1, 2000, (1, 500), "periods per revolution, a whole number")]
 PolePairs = Annotated[int, Range(1, 200, (1, 60))]

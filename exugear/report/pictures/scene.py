@@ -355,7 +355,7 @@ def elastic_scene(assembly: Assembly, shape: Floats, *, title: str = "", amplitu
     fixed = {body.name: body.axis for body in assembly.bodies if body.fixed}
     for name, coordinates in assembly.elastic_slices.items():
         surface = assembly.elastic_bodies[name].reduced.surface
-        if name in fixed:
+        if name in fixed and surface.elasticity.any():  # the nodes of matrices hide nothing
             surface = _half_behind(surface, fixed[name])
         motion = shape[coordinates]
         deformed.append((surface, surface.displacement @ motion, surface.energy_density(motion)))

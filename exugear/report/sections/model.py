@@ -162,8 +162,7 @@ def _elastic_words(material: ReportData) -> Iterator[str]:
     case = context.gearbox.case
     parts = []
     for name, body in assembly.elastic_bodies.items():
-        unknowns = sum(body.reduced.summary.unknowns.values())
-        parts.append(f"{name} ({unknowns} unknowns reduced to {body.reduced.size} coordinates)")
+        parts.append(f"{name} ({body.reduced.origin})")
     yield (
         f"Flexible in the variant {assembly.variant}: {', '.join(parts)}; damping {1e6 * case.damping.body_time_s:g} "
         f"µs times the stiffness, modes listed up to {case.elasticity.band_Hz:g} Hz."

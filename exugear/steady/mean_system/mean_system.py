@@ -245,8 +245,11 @@ def unsuitable(assembly: Assembly, elastic: Collection[str] = ()) -> str:
 
 def _has_sectors(gearbox: Gearbox, mesh: Mesh) -> bool:
     """Whether a mesh travels around the sectors of its elastic gear."""
-    solid = gearbox.case.bodies[gearbox.body(mesh.gear).family].solid
-    seat = None if solid is None else solid.seats.get(mesh.pair.gear.name)
+    section = gearbox.case.bodies[gearbox.body(mesh.gear).family]
+    name = mesh.pair.gear.name
+    if section.external is not None:
+        return name in section.external.seats and bool(section.external.seats[name].sector_nodes)
+    seat = None if section.solid is None else section.solid.seats.get(name)
     return seat is not None and seat.sectors is not None
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import LARGEST_SOLID
-from exugear.gearbox.parts import Bearing, Body
+from exugear.gearbox.parts import Body
 from exugear.gearbox.sections.bodies import (
     BlankSection,
     ShaftSectionSection,
@@ -28,7 +28,11 @@ from exugear.gearbox.sections.gears import MaterialSection
 from exugear.gearbox.units import MM, optional_si, si
 from exugear.system.bearings.stiffness import elastic_names, mounts_at_work
 from exugear.system.bodies.elastic_body import ElasticBody, FloatingBody
-from exugear.system.bodies.reduction import Blank, Frame, ReducedBody, ReductionError, RigidInertia, with_rigid_inertia
+from exugear.system.bodies.external import ExternalModel, placed_matrices, reduce_external
+from exugear.system.bodies.external_of_gearbox import ExternalBody, check_external, external_body
+from exugear.system.bodies.matrix_files.interface import MatrixFileError
+from exugear.system.bodies.reduction import Blank, ReducedBody, ReductionError, RigidInertia, with_rigid_inertia
+from exugear.system.bodies.seated_items import Item, frame_of, items_on, seat_width
 from exugear.system.bodies.shaft_sections import (
     MeshSize,
     SeatBand,
@@ -52,7 +56,7 @@ from exugear.system.bodies.turned_section import Shaft, turned_hexahedra
 from exugear.system.bodies.turned_shaft import ShaftModel, load_or_reduce_shaft, reduce_shaft
 from fe_ste.geometry.gears import Material
 
-# Input of a reduction from the gearbox file: materials, blanks, frames, widths of seats
+# Input of a reduction from the gearbox file: materials and blanks
 
 
 def material_of(section: MaterialSection) -> Material:
@@ -63,23 +67,6 @@ def material_of(section: MaterialSection) -> Material:
 def blank_of(section: BlankSection) -> Blank:
     """Rigid ring on a seat, kg and kg m2."""
     return Blank(section.mass_kg, section.transverse_kg_m2, section.axial_kg_m2)
-
-
-def seat_width(bearing: Bearing) -> float:
-    """Width of a bearing's seat (m): that of its rows; a plane where only a stiffness is given."""
-    if bearing.catalogue is None:
-        return 0.0
-    rows = 1 if bearing.catalogue.arrangement == "single" else 2
-    return rows * si(bearing.catalogue, "width_mm")
-
-
-def frame_of(gearbox: Gearbox, body: Body) -> Frame:
-    """Frame that an elastic body is seen from: the ground, its own that turns, or one that does not."""
-    if body.fixed:
-        return "ground"
-    if any(other.carrier == body.name for other in gearbox.bodies()):
-        return "carrier"
-    return "nonrotating"
 
 
 # Turned shafts of a gearbox: shapes from its file, seats where gears and bearings sit
@@ -309,51 +296,12 @@ def solid_body(gearbox: Gearbox, name: str) -> SolidBody:
     return SolidBody(model, solid.torque_seat or names[0], sectors, shared)
 
 
-@dataclass(frozen=True)
-class _Item:
-    """What sits on a solid: its position (m), and diameter and width (m) of its seat where they are known.
-
-    `family` is its name in the file, `noun` what it is, `needed` whether there must be a seat for it.
-    """
-
-    family: str
-    noun: str
-    position: tuple[float, float, float]
-    diameter: float | None
-    width: float | None
-    needed: bool = True
-
-
-def _items(gearbox: Gearbox, body: Body) -> dict[str, _Item]:
-    """All that sits on a body, by the name of its seat."""
-    items = {}
-    for name, z in body.wheels.items():
-        gear = gearbox.gears[name]
-        items[name] = _Item(name, "gear", (*body.axis, z), gear.held_diameter, gear.face_width)
-    for bearing in gearbox.bearings:
-        if body.name not in (bearing.body, bearing.on):
-            continue
-        diameter = None
-        width = None
-        if bearing.catalogue is not None:
-            # A planet turns about its bearing, all other bodies in theirs.
-            inside = (bearing.body == body.name) != bearing.carries_outer_ring
-            diameter = MM * (bearing.catalogue.bore_mm if inside else bearing.catalogue.outer_diameter_mm)
-            width = seat_width(bearing)
-        items[bearing.name] = _Item(bearing.family, "bearing", bearing.position, diameter, width)
-    at_work = {mount.name for mount in mounts_at_work(gearbox)}
-    for mount in gearbox.mounts:
-        if mount.body == body.name:
-            items[mount.name] = _Item(mount.name, "mount", mount.position, None, None, mount.name in at_work)
-    return items
-
-
 def _solid_seats(
     gearbox: Gearbox, body: Body, solid: SolidSection
 ) -> tuple[list[SolidSeat], dict[str, tuple[str, ...]], dict[str, str]]:
     """Seats of a solid, the sectors of its gears, and the seats that bearings share."""
     key = f"bodies.{body.family}.solid.seats"
-    items = _items(gearbox, body)
+    items = items_on(gearbox, body)
     families = {item.family for item in items.values()}
     sections = {name: solid.seats.get(name, solid.seats.get(item.family)) for name, item in items.items()}
     others = {name: section for name, section in solid.seats.items() if name not in items and name not in families}
@@ -385,7 +333,7 @@ def _solid_seats(
     return seats, sectors, shared_seats
 
 
-def _solid_seat(gearbox: Gearbox, key: str, name: str, item: _Item | None, section: SolidSeatSection) -> SolidSeat:
+def _solid_seat(gearbox: Gearbox, key: str, name: str, item: Item | None, section: SolidSeatSection) -> SolidSeat:
     """One seat, from its entry in the file and the known data of the item on it."""
     diameter, width = (None, None) if item is None else (item.diameter, item.width)
     if section.diameter_mm is not None:
@@ -419,7 +367,7 @@ def _parts(seat: SolidSeat, count: int) -> list[SolidSeat]:
 
 def _solid_blanks(gearbox: Gearbox, body: Body, solid: SolidSection, names: list[str]) -> dict[str, Blank]:
     """Blanks by seat; a blank of a bearing of all planets is added at each of its seats."""
-    families = {name: item.family for name, item in _items(gearbox, body).items()}
+    families = {name: item.family for name, item in items_on(gearbox, body).items()}
     blanks: dict[str, Blank] = {}
     for name, section in solid.blanks.items():
         on = [seat for seat in names if name in (seat, families.get(seat))]
@@ -427,6 +375,31 @@ def _solid_blanks(gearbox: Gearbox, body: Body, solid: SolidSection, names: list
             raise gearbox.error(f"bodies.{body.family}.solid.blanks.{name}: no such seat; seats are {', '.join(names)}")
         blanks |= dict.fromkeys(on, blank_of(section))
     return blanks
+
+
+def node_numbers(gearbox: Gearbox, name: str) -> dict[str, int]:
+    """Return the node number of each seat of a flexible body in files for other programs.
+
+    A body from matrices keeps their numbers; the seats of a solid are numbered from 1.
+
+    Raises
+    ------
+    GearboxFileError
+        As `external_body` and `solid_body`.
+    exugear.system.bodies.matrix_files.interface.MatrixFileError, ReductionError
+        The matrices cannot be used.
+    """
+    section = gearbox.case.bodies[gearbox.body(name).family]
+    if section.external is not None:
+        external = external_body(gearbox, name)
+        names = [seat.name for seat in external.model.seats]
+        numbers = dict(zip(names, placed_matrices(external.model).nodes, strict=False))
+        shared = external.shared_seats
+    else:
+        solid = solid_body(gearbox, name)
+        numbers = {seat.name: number for number, seat in enumerate(solid.model.seats, start=1)}
+        shared = solid.shared_seats
+    return numbers | {seat: numbers[other] for seat, other in shared.items()}
 
 
 def solids_of(gearbox: Gearbox) -> Iterator[tuple[str, SolidModel]]:
@@ -475,7 +448,7 @@ def reduced_bodies(
     Raises
     ------
     GearboxFileError
-        A shape or solid that cannot be, or that its gears and bearings do not fit on.
+        A shape, solid or matrices that cannot be, or that its gears and bearings do not fit on.
     """
     bodies = {}
     for name in elastic_names(gearbox):
@@ -487,24 +460,30 @@ def reduced_bodies(
 
 def _elastic_body(gearbox: Gearbox, body: Body, folder: Path | None) -> ElasticBody:
     section = gearbox.case.bodies[body.family]
-    solid = None if section.solid is None else solid_body(gearbox, body.name)
-    key = "shape" if solid is None else "solid"
-    model = shaft_model(gearbox, body.name) if solid is None else solid.model
+    model: ShaftModel | SolidModel | ExternalModel
+    seated: SolidBody | ExternalBody | None = None
+    if section.external is not None:
+        key, seated = "external", external_body(gearbox, body.name)
+        model, digest = seated.model, seated.model.file_digest
+    elif section.solid is not None:
+        key, seated = "solid", solid_body(gearbox, body.name)
+        model, digest = seated.model, hashlib.sha256(seated.model.mesh.path.read_bytes()).hexdigest()
+    else:
+        key, model, digest = "shape", shaft_model(gearbox, body.name), ""
     floating = None
     try:
-        if section.flexibility == "ffrf":
+        if section.flexibility == "ffrf" and not isinstance(model, ExternalModel):
             of_shape, floating = _floating(_Hashed(model), folder)
         else:
             of_shape = _reduced(_Hashed(model), folder)
-    except (ShaftError, SolidError, ReductionError) as error:
+    except (ShaftError, SolidError, ReductionError, MatrixFileError) as error:
         raise gearbox.error(f"bodies.{body.family}.{key}: {error}") from None
     wanted = RigidInertia(body.mass, (*body.axis, body.centre_of_mass_z), body.transverse, body.axial)
     reduced = of_shape if body.fixed else with_rigid_inertia(of_shape, wanted)
     floating = None if floating is None else with_inertia(floating, wanted)
     inertia = of_shape.rigid_inertia
-    if solid is not None:
-        digest = hashlib.sha256(solid.model.mesh.path.read_bytes()).hexdigest()
-        return ElasticBody(reduced, inertia, solid.main_seat, solid.sectors, solid.shared_seats, floating, digest)
+    if seated is not None:
+        return ElasticBody(reduced, inertia, seated.main_seat, seated.sectors, seated.shared_seats, floating, digest)
     seats = [seat.name for seat in of_shape.seats]
     shared = shared_seats(gearbox, body.name)
     torque = shared.get(TORQUE_SEAT, TORQUE_SEAT)
@@ -518,9 +497,12 @@ def check_elastic_body(gearbox: Gearbox, name: str) -> None:
     Raises
     ------
     GearboxFileError
-        A shape or solid that cannot be, a solid whose file is not there, seats that do not fit.
+        A shape or solid that cannot be, a file that is not there, matrices that fail a check, seats that do not fit.
     """
     family = gearbox.body(name).family
+    if gearbox.case.bodies[family].external is not None:
+        check_external(gearbox, name)
+        return
     if gearbox.case.bodies[family].solid is not None:
         mesh = solid_body(gearbox, name).model.mesh
         if isinstance(mesh, SolidFile) and mesh.is_mesh:
@@ -558,7 +540,7 @@ def check_shape(gearbox: Gearbox, family: str) -> None:
 class _Hashed:
     """A model of a body by its key, so that it can be looked up."""
 
-    def __init__(self, model: ShaftModel | SolidModel) -> None:
+    def __init__(self, model: ShaftModel | SolidModel | ExternalModel) -> None:
         self.model = model
         self.key = model.key
 
@@ -572,6 +554,8 @@ class _Hashed:
 @lru_cache(maxsize=64)
 def _reduced(hashed: _Hashed, folder: Path | None) -> ReducedBody:
     model = hashed.model
+    if isinstance(model, ExternalModel):
+        return reduce_external(model)
     if isinstance(model, SolidModel):
         return reduce_solid(model) if folder is None else load_or_reduce_solid(model, folder)
     return reduce_shaft(model) if folder is None else load_or_reduce_shaft(model, folder)
@@ -580,4 +564,5 @@ def _reduced(hashed: _Hashed, folder: Path | None) -> ReducedBody:
 @lru_cache(maxsize=16)
 def _floating(hashed: _Hashed, folder: Path | None) -> tuple[ReducedBody, FloatingBody]:
     model = hashed.model
+    assert not isinstance(model, ExternalModel)
     return load_or_reduce_floating(model if isinstance(model, SolidModel) else solid_of_shaft(model), folder)

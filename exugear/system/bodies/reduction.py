@@ -114,7 +114,7 @@ class ReductionSummary:
     """What a reduction took and which modes it kept, by harmonic, or under "whole" for a solid mesh."""
 
     unknowns: Mapping[str, int]
-    """Number of unknowns."""
+    """Number of unknowns; empty for matrices of another program."""
     seconds: float
     """Wall time."""
     free_interface_frequencies: Mapping[str, tuple[float, ...]]
@@ -160,6 +160,16 @@ class ReducedBody(
     def size(self) -> int:
         """Number of coordinates."""
         return len(self.spin)
+
+    @property
+    def origin(self) -> str:
+        """What the body was reduced from, in words."""
+        unknowns = sum(self.summary.unknowns.values())
+        return (
+            f"{unknowns} unknowns reduced to {self.size} coordinates"
+            if unknowns
+            else f"matrices of {self.size} coordinates"
+        )
 
     def first_coordinate(self, seat_name: str) -> int:
         """Find the first of a seat's six coordinates.
@@ -447,20 +457,25 @@ def selective_mass_scaling(mass: Floats, stiffness: Floats, limit: float) -> tup
     Only the step of an explicit solver would feel these modes. Mass is added in their shapes phi alone:
     M + sum (w^2 / w_limit^2 - 1) M phi (M phi)'. The other modes and all static deflections stay as they are.
     The method for explicit finite elements is that of Olovsson, Simonsson and Unosson (International Journal for
-    Numerical Methods in Engineering 63, 2005); here the modes are known, so that it is exact.
+    Numerical Methods in Engineering 63, 2005); here the modes are known, so that it is exact. Motions without mass, as
+    matrices of other programs may have, get that of the limit.
 
     Examples
     --------
     >>> mass, scaled = selective_mass_scaling(np.eye(2), np.diag([4.0, 9.0]) * np.pi**2, 1.2)
-    >>> scaled, np.diag(mass)
-    ((1.5,), array([1.    , 1.5625]))
+    >>> [round(frequency, 12) for frequency in scaled], np.diag(mass).round(12)
+    ([1.5], array([1.    , 1.5625]))
     """
-    values, shapes = scipy.linalg.eigh(stiffness, mass)
-    ratio = values / (2.0 * np.pi * limit) ** 2
-    high = ratio > 1.0
-    momenta = mass @ shapes[:, high]
-    added = (momenta * (ratio[high] - 1.0)) @ momenta.T
-    return mass + added, tuple(float(f) for f in limit * np.sqrt(ratio[high]))
+    shift = (2.0 * np.pi * limit) ** 2
+    # Of this pencil all eigenvalues 1 / (w^2 + shift) are finite, those of motions without mass are zero.
+    pencil = stiffness + shift * mass
+    values, shapes = scipy.linalg.eigh(mass, pencil)
+    high = values < 0.5 / shift
+    momenta = pencil @ shapes[:, high]
+    added = (momenta * (1.0 / shift - 2.0 * values[high])) @ momenta.T
+    with np.errstate(divide="ignore"):
+        ratio = 1.0 / (np.maximum(values[high], 0.0) * shift) - 1.0
+    return mass + added, tuple(float(f) for f in limit * np.sqrt(ratio[::-1]))
 
 
 def rigid_gyroscopic_matrix(inertia: RigidInertia, frame: Frame) -> Floats:
@@ -475,6 +490,55 @@ def rigid_gyroscopic_matrix(inertia: RigidInertia, frame: Frame) -> Floats:
     elif frame == "carrier":
         matrix[0, 1], matrix[3, 4] = -2.0 * inertia.mass, inertia.axial - 2.0 * inertia.transverse
     return matrix - matrix.T
+
+
+ASYMMETRY_TOLERANCE = 5e-3
+"""Relative change of the seats' mass or stiffness by rotation through 90 degrees above which a body is not a body of
+revolution.
+"""
+OFF_AXIS = 1e-6
+"""Distance of a seat from the axis, m, beyond which a body is not a body of revolution."""
+
+
+def check_revolution(
+    name: str,
+    seats: Sequence[tuple[float, float, float]],
+    axis: tuple[float, float],
+    mass: Floats,
+    stiffness: Floats,
+) -> None:
+    """Raise an error if rotation through 90 degrees changes a body, or if its seats are not on the axis.
+
+    Parameters
+    ----------
+    seats : positions, m
+    axis : position x, y of the axis of rotation, m
+    mass, stiffness : (n, n) with the coordinates of the seats first
+
+    Raises
+    ------
+    ReductionError
+        The body is not a body of revolution.
+    """
+    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    count = 6 * len(seats)
+    turn = np.kron(np.eye(count // 3), quarter)
+    distance = max(float(np.hypot(seat[0] - axis[0], seat[1] - axis[1])) for seat in seats)
+    if distance > OFF_AXIS:
+        raise ReductionError(
+            f"body {name}: a seat is {1e3 * distance:.3g} mm off the axis, but 'nonrotating' requires a body of "
+            "revolution; move it to the axis, or remove it"
+        )
+    for matrix_name, matrix in (("mass", mass), ("stiffness", stiffness)):
+        at_seats = matrix[:count, :count]
+        # Entries differ in unit, so that each is compared with the diagonal entries of its row and column.
+        diagonal = np.sqrt(np.maximum(at_seats.diagonal(), np.abs(turn) @ at_seats.diagonal()))
+        change = float((np.abs(turn @ at_seats @ turn.T - at_seats) / np.outer(diagonal, diagonal)).max())
+        if change > ASYMMETRY_TOLERANCE:
+            raise ReductionError(
+                f"body {name}: a rotation by 90 degrees changes its {matrix_name} by {change:.1e}, but 'nonrotating' "
+                "requires a body of revolution; refine the mesh, or describe the shaft by a [.shape] table"
+            )
 
 
 def with_rigid_inertia(body: ReducedBody, wanted: RigidInertia) -> ReducedBody:

@@ -52,6 +52,7 @@ from exugear.system.bodies.reduction import (
     ReductionSummary,
     RigidInertia,
     Seat,
+    check_revolution,
     load_or_reduce,
     reduce_component,
     rigid_gyroscopic_matrix,
@@ -78,12 +79,6 @@ if TYPE_CHECKING:
     from fe_ste.elimination import Backend
 else:
     skfem = lazy_import("skfem")
-
-
-ASYMMETRY_TOLERANCE = 5e-3
-"""Relative change of the seats' mass or stiffness by rotation through 90 degrees above which a body is not a body of
-revolution.
-"""
 
 
 @dataclass(frozen=True)
@@ -243,7 +238,13 @@ def gyroscopic_matrix(model: SolidModel, reduced: ReducedSolid) -> Floats:
     size = reduced.component.component_modes.shape[1]
     matrix = np.zeros((size, size))
     if model.frame == "nonrotating":
-        _check_revolution(model, reduced.component)
+        check_revolution(
+            model.name,
+            [seat.centre for seat in model.seats],
+            model.axis,
+            reduced.component.mass,
+            reduced.component.stiffness,
+        )
         scalar = expand_to_directions(reduced.solid.convection - reduced.solid.convection.T)
         matrix = modes.T @ (scalar @ modes)
     elif model.frame == "carrier":
@@ -271,24 +272,6 @@ def _blank_gyroscopics(blank: Blank, frame: Frame) -> Floats:
     Its mass distribution has int rho x^2 = int rho y^2 = axial / 2 and int rho z^2 = transverse - axial / 2.
     """
     return rigid_gyroscopic_matrix(RigidInertia(blank.mass, (0.0, 0.0, 0.0), blank.transverse, blank.axial), frame)
-
-
-def _check_revolution(model: SolidModel, component: ReducedComponent) -> None:
-    """Raise an error if rotation through 90 degrees changes the body, or if its seats are not on the axis."""
-    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    count = 6 * len(model.seats)
-    turn = np.kron(np.eye(count // 3), quarter)
-    off_axis = any(np.hypot(*(np.array(seat.centre[:2]) - model.axis)) > 0 for seat in model.seats)
-    for name, matrix in (("mass", component.mass), ("stiffness", component.stiffness)):
-        at_seats = matrix[:count, :count]
-        # Entries differ in unit, so that each is compared with the diagonal entries of its row and column.
-        diagonal = np.sqrt(np.maximum(at_seats.diagonal(), np.abs(turn) @ at_seats.diagonal()))
-        change = float((np.abs(turn @ at_seats @ turn.T - at_seats) / np.outer(diagonal, diagonal)).max())
-        if change > ASYMMETRY_TOLERANCE or off_axis:
-            raise ReductionError(
-                f"body {model.name}: a rotation by 90 degrees changes its {name} by {change:.1e}, but 'nonrotating' "
-                "requires a body of revolution; refine the mesh, or describe the shaft by a [.shape] table"
-            )
 
 
 def _surface(model: SolidModel, reduced: ReducedSolid) -> BodySurface:

@@ -307,7 +307,7 @@ class Parts:
     bodies: dict[str, Any] = field(default_factory=dict)
     """Object of each rigid body."""
     elastic_nodes: dict[str, list[Any]] = field(default_factory=dict)
-    """All nodes of each elastic body: those of its seats, then one for its modal coordinates."""
+    """All nodes of each elastic body: those of its seats, then one for its modal coordinates if it has some."""
     seat_positions: dict[str, Floats] = field(default_factory=dict)
     """(3,) of each seat by its key, m."""
     floating: FloatingBodies | None = None
@@ -431,16 +431,17 @@ def _add_elastic_body(parts: Parts, name: str, q: Floats, v: Floats) -> None:
         parts.seat_positions[key] = position
     nodes = [parts.nodes[seat_key(name, seat.name)] for seat in reduced.seats]
     modal = slice(coordinates.start + 6 * len(reduced.seats), coordinates.stop)
-    nodes.append(
-        parts.mbs.AddNode(
-            items.NodeGenericODE2(
-                referenceCoordinates=[0.0] * len(reduced.modal_groups),
-                initialCoordinates=q[modal].tolist(),
-                initialCoordinates_t=v[modal].tolist(),
-                numberOfODE2Coordinates=len(reduced.modal_groups),
+    if reduced.modal_groups:  # statically condensed matrices have none, and Exudyn refuses a node without coordinates
+        nodes.append(
+            parts.mbs.AddNode(
+                items.NodeGenericODE2(
+                    referenceCoordinates=[0.0] * len(reduced.modal_groups),
+                    initialCoordinates=q[modal].tolist(),
+                    initialCoordinates_t=v[modal].tolist(),
+                    numberOfODE2Coordinates=len(reduced.modal_groups),
+                )
             )
         )
-    )
     parts.elastic_nodes[name] = nodes
     parts.nodes[name] = parts.nodes[seat_key(name, elastic.main_seat)]
     for item, seat_name in elastic.shared_seats.items():

@@ -14,11 +14,14 @@ from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
+import numpy as np
 from pydantic import BaseModel
 
 from exugear.gearbox.sections.case import GearboxFile
 from exugear.gearbox.sections.entries import Range
+from exugear.system.bodies.matrix_files.files import file_contents
 
+from .beams import beams_between
 from .box import write_plate
 from .spur import SPUR_CASE
 
@@ -48,8 +51,9 @@ def bases(folder: Path) -> dict[str, dict[str, Any]]:
         "spur": tomllib.loads(SPUR_CASE),
         "modified": _modified(),
         "planetary": _planetary(grc),
-        "shafts": _with_shapes(),
+        "shafts": shaped_shafts(),
         "box": _with_box(),
+        "matrices": _with_matrices(folder),
     }
 
 
@@ -138,7 +142,8 @@ def _planetary(grc: dict[str, Any]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _with_shapes() -> dict[str, Any]:
+def shaped_shafts() -> dict[str, Any]:
+    """The spur pair on two flexible shafts, one with a force."""
     case = tomllib.loads(SPUR_CASE)
     for name, gear in (("shaft_1", "pinion"), ("shaft_2", "wheel")):
         case["bodies"][name] |= {
@@ -179,6 +184,23 @@ def _with_box() -> dict[str, Any]:
         bearing["on"] = "box"
     held = {"radial_N_per_m": 5e7, "axial_N_per_m": 5e7, "tilt_N_m_per_rad": 1e5, "torsion_N_m_per_rad": 1e5}
     case["mounts"] = {"foot": {"body": "box", "position_mm": [50.0, 0.0, -40.0], "stiffness": held}}
+    return case
+
+
+def _with_matrices(folder: Path) -> dict[str, Any]:
+    """The spur pair in a frame of beams from matrices, which are written into the folder."""
+    places = np.array([[0.0, 0.0, 0.0], [0.075, 0.0, 0.0], [0.05, 0.0, -0.012]])
+    for name, content in file_contents(
+        beams_between(places, (1, 2, 3), 0.01).from_si("mm-t-s"), "frame", "op4"
+    ).items():
+        (folder / name).write_bytes(content)
+    case = _with_box()
+    del case["bodies"]["box"]["solid"]
+    case["bodies"]["box"]["external"] = {
+        "file": "frame.op4", "nodes": "frame-nodes.pch", "units": "mm-t-s", "stiffness_name": "KAAX",
+        "mass_name": "MAAX", "constraint": "rbe3", "shift_mm": [0.0, 0.0, 0.0], "turn_deg": [0.0, 0.0, 0.0],
+        "seats": {"bearing_1": {"node": 1}, "foot": {"position_mm": [50.0, 0.0, -12.0]}},
+    }  # fmt: skip
     return case
 
 

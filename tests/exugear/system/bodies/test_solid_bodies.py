@@ -334,7 +334,7 @@ def test_faults_name_body_key_and_what_would_be_right(tmp_path: Path, monkeypatc
     refused({"bodies.box.flexibility": "nonrotating"}, "is for rotating bodies; set 'elastic' for a fixed body")
     refused({"bodies.box.flexibility": "none"}, "no flexible body is defined; add")
     shape = {"start_z_mm": 0.0, "sections": [{"length_mm": 10.0, "outer_diameter_mm": 10.0}]}
-    refused({"bodies.box.shape": shape}, "set a shape or a solid, not both")
+    refused({"bodies.box.shape": shape}, "set one of shape, solid and external")
     if works("gmsh"):
         refused({f"{solid}.file": "plate.step", f"{solid}.element_size_mm": 20.0}, r"plate\.step: gmsh cannot")
 

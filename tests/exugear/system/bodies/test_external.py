@@ -1,0 +1,511 @@
+"""Bodies from matrices of other programs in the gearbox file and in the variant `flexible`."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from exugear.cli.app import app
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.reading import GearboxFileError
+from exugear.report.pictures.scene import elastic_scene
+from exugear.steady.mean_system.mean_system import ELASTIC_RING, unsuitable
+from exugear.system.bodies.external import interface_of
+from exugear.system.bodies.external_of_gearbox import check_external, external_warnings
+from exugear.system.bodies.matrix_files.files import MatrixFormat, file_contents, keys_of
+from exugear.system.bodies.matrix_files.interface import InterfaceMatrices
+from exugear.system.bodies.of_gearbox import node_numbers
+from exugear.system.bodies.reduction import ReducedBody, selective_mass_scaling
+from exugear.system.loads import LoadTable
+from exugear.system.modes import modes_of
+from exugear.system.statics import accelerating_start, static_state
+from exugear.system.system import Assembly, input_hash
+from exugear.transient.compiled.solver import CompiledSystem
+
+from ....optional_libraries import needs_gmsh, needs_meshio
+from ...cases.assembled import assembled, bodies_of
+from ...cases.beams import beams_between
+from ...cases.both_ways import assert_matrices_of_exudyn_are_those_of, compiled_states, exudyn_states, relative_error
+from ...cases.box import box_content
+from ...cases.case_mutations import shaped_shafts
+from ...cases.plain_motion import accelerations_of
+from ...cases.plain_signals import sampled
+from ...cases.ring import FACE, MIDDLE, OUTER, ring_content
+
+pytestmark = needs_meshio
+
+STIFFNESS = {"spur": 2e8 * (1.0 + 0.1 * np.cos(2.0 * np.pi * np.arange(16) / 16))}
+LOAD = {"shaft_1": 100.0, "shaft_2": 140.0}
+FOOT = {"foot": {"position_mm": [50.0, 0.0, -12.0]}}
+"""The mount stands below its node."""
+TOLERANCE = {"dmig": 1e-8}
+"""Largest relative change of modes and static state by a file: 1e-9, but for the digits of a punch file."""
+
+
+def box_of(folder: Path, external: Mapping[str, Any], solid: bool = False) -> Gearbox:
+    """The spur pair in a box from matrices."""
+    content = box_content(folder)
+    if not solid:
+        del content["bodies"]["box"]["solid"]
+    content["bodies"]["box"]["external"] = {"units": "SI", "seats": FOOT, **external}
+    return Gearbox.from_dict(content, str(folder / "case.toml"))
+
+
+def write(folder: Path, body: InterfaceMatrices, form: MatrixFormat = "npz") -> dict[str, str]:
+    for name, content in file_contents(body, "box", form).items():
+        (folder / name).write_bytes(content)
+    return keys_of("box", form)
+
+
+@pytest.fixture(scope="module")
+def housed(tmp_path_factory: pytest.TempPathFactory) -> Assembly:
+    """With the box reduced here."""
+    folder = tmp_path_factory.mktemp("box")
+    return assembled(Gearbox.from_dict(box_content(folder), str(folder / "case.toml")), Choice("flexible"), STIFFNESS)
+
+
+@pytest.fixture(scope="module")
+def box(housed: Assembly) -> InterfaceMatrices:
+    return interface_of(housed.elastic_bodies["box"].reduced)
+
+
+def largest_change(found: Assembly, wanted: Assembly) -> float:
+    """Largest relative change of the elastic modes' frequencies and of the static state."""
+    one, two = (modes_of(assembly).frequency for assembly in (found, wanted))
+    moving = two > 1.0
+    static = [static_state(assembly).q for assembly in (found, wanted)]
+    return max(
+        float(np.abs(one[moving] / two[moving] - 1.0).max()),
+        float(np.abs(static[0] - static[1]).max() / np.abs(static[1]).max()),
+    )
+
+
+@pytest.mark.parametrize("form", get_args(MatrixFormat))
+@pytest.mark.parametrize("units", ["SI", "mm-t-s"])
+def test_a_box_written_and_read_back_is_the_same_in_the_gearbox(
+    tmp_path: Path, housed: Assembly, box: InterfaceMatrices, form: MatrixFormat, units: str
+) -> None:
+    keys = write(tmp_path, box.from_si(units), form)
+    found = assembled(box_of(tmp_path, {**keys, "units": units}), Choice("flexible"), STIFFNESS)
+    assert largest_change(found, housed) < TOLERANCE.get(form, 1e-9)
+
+
+def test_a_box_in_other_axes_is_turned_and_shifted_back(
+    tmp_path: Path, housed: Assembly, box: InterfaceMatrices
+) -> None:
+    # The other program's axes: rotated by 90 degrees about x, then by 30 about z, and shifted.
+    c, s = np.cos(np.pi / 6), np.sin(np.pi / 6)
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    about_z = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    turn, shift = about_z @ about_x, np.array([0.3, -0.2, 0.1])
+    elsewhere = box.moved(turn.T, -turn.T @ shift)
+    external = {**write(tmp_path, elsewhere), "turn_deg": [90.0, 0.0, 30.0], "shift_mm": [300.0, -200.0, 100.0]}
+    found = assembled(box_of(tmp_path, external), Choice("flexible"), STIFFNESS)
+    assert largest_change(found, housed) < 1e-9
+
+
+def test_runs_by_both_solvers_of_a_box_from_matrices(tmp_path: Path, box: InterfaceMatrices) -> None:
+    assembly = assembled(box_of(tmp_path, write(tmp_path, box)), Choice("flexible"), STIFFNESS)
+    start = accelerating_start(assembly, LOAD, 5.0)
+    system = CompiledSystem(assembly, start.q, start.v, LoadTable(LOAD), 5e-6)
+    plain = accelerations_of(assembly, start.q, start.v, assembly.torque_vector(LOAD))
+    assert np.abs(system.accelerations() - plain).max() < 1e-9 * np.abs(plain).max()
+    found, expected = (
+        sampled(assembly, *states(assembly, start.q, start.v, LOAD, 200, 5e-6))
+        for states in (compiled_states, exudyn_states)
+    )
+    assert relative_error(found, expected) < 1e-5
+
+
+def test_statically_condensed_matrices_have_no_modal_coordinates_in_both_models(
+    tmp_path: Path, box: InterfaceMatrices
+) -> None:
+    count = 6 * len(box.nodes)
+    condensed = InterfaceMatrices(box.nodes, box.positions, (), box.mass[:count, :count], box.stiffness[:count, :count])
+    assembly = assembled(box_of(tmp_path, write(tmp_path, condensed, "op4")), Choice("flexible"), STIFFNESS)
+    assert assembly.elastic_bodies["box"].reduced.modal_groups == ()
+    assert_matrices_of_exudyn_are_those_of(assembly, np.zeros(assembly.size), 1e-9)
+
+
+def test_rigid_motions_of_few_digits_store_no_energy(tmp_path: Path, box: InterfaceMatrices) -> None:
+    single = InterfaceMatrices(
+        box.nodes,
+        box.positions,
+        box.modal,
+        box.mass.astype(np.float32).astype(np.float64),
+        box.stiffness.astype(np.float32).astype(np.float64),
+    )
+    assembly = assembled(box_of(tmp_path, write(tmp_path, single)), Choice("flexible"), STIFFNESS)
+    body = assembly.elastic_bodies["box"].reduced
+    motions = body.rigid_motions((0.0, 0.0, 0.0))
+    energy = np.diag(motions.T @ body.stiffness @ motions)
+    one_by_one = np.sum(motions**2 * np.diag(body.stiffness)[:, None], axis=0)
+    assert np.abs(energy / one_by_one).max() < 1e-15
+    assert np.abs(np.diag(motions.T @ single.stiffness @ motions) / one_by_one).max() > 1e-12  # as it was in the file
+
+
+def test_motions_without_mass_get_that_of_the_limit() -> None:
+    """A spring of 9 between a mass of 1 and a massless end; w = sqrt(9 / m) of the added mass m is the limit, 2."""
+    stiffness = np.diag([0.0, 9.0])
+    mass, scaled = selective_mass_scaling(np.diag([1.0, 0.0]), stiffness, 2.0 / (2.0 * np.pi))
+    assert mass == pytest.approx(np.diag([1.0, 2.25]))
+    assert scaled == (np.inf,)
+
+
+def test_a_body_of_lumped_masses_moves_with_the_gearbox(tmp_path: Path) -> None:
+    places = np.array([[0.0, 0.0, 0.0], [0.075, 0.0, 0.0], [0.05, 0.0, -0.012]])
+    beams = beams_between(places, (1, 2, 3), 0.01)
+    lumped = InterfaceMatrices(
+        beams.nodes, places, (), np.diag(np.tile([0.2, 0.2, 0.2, 0.0, 0.0, 0.0], 3)), beams.stiffness
+    )
+    gearbox = box_of(tmp_path, write(tmp_path, lumped))
+    assert any("some motions have none" in line for line in external_warnings(gearbox, "box"))
+    assembly = assembled(gearbox, Choice("flexible"), STIFFNESS)
+    frequencies = modes_of(assembly).frequency
+    assert np.isfinite(frequencies).all()
+    assert frequencies.max() < 12000.0 * 1.01 + 1e4
+
+
+@pytest.mark.validation
+@pytest.mark.long
+@needs_gmsh
+@pytest.mark.parametrize("form", ["npz", "dmig"])
+def test_the_housing_of_the_grc_written_and_read_back_is_the_same_in_the_gearbox(
+    tmp_path: Path, grc: Gearbox, stiffness: dict[str, np.ndarray], form: MatrixFormat
+) -> None:
+    rigid = {f"bodies.{name}.flexibility": "none" for name in ("carrier", "lss", "ims", "hss")}
+    wanted = assembled(grc.varied(rigid), Choice("flexible"), stiffness)
+    body = wanted.elastic_bodies["housing"]
+    numbers = {seat.name: number for number, seat in enumerate(body.reduced.seats, start=1)}
+    sectors = {gear: {"sector_nodes": [numbers.pop(seat) for seat in seats]} for gear, seats in body.sectors.items()}
+    shared = {name: {"same_as": other} for name, other in body.shared_seats.items()}
+    content = copy.deepcopy(dict(grc.varied(rigid).content))
+    del content["bodies"]["housing"]["solid"]
+    content["bodies"]["housing"]["external"] = {
+        **write(tmp_path, interface_of(body.reduced), form),
+        "units": "SI",
+        "seats": {**sectors, **shared, **{name: {"node": number} for name, number in numbers.items()}},
+    }
+    found = assembled(Gearbox.from_dict(content, str(tmp_path / "case.toml")), Choice("flexible"), stiffness)
+    assert largest_change(found, wanted) < TOLERANCE.get(form, 1e-9)
+
+
+# Rotating bodies
+
+
+def whirl_frequencies(body: ReducedBody, speed: float) -> np.ndarray:
+    """Frequencies of a body on springs at its seats at a speed (rad/s), Hz."""
+    stiffness = body.stiffness.copy()
+    for seat in range(len(body.seats)):
+        stiffness[6 * seat : 6 * seat + 6, 6 * seat : 6 * seat + 6] += np.diag([2e7, 2e7, 1e7, 1e3, 1e3, 1e3])
+    inverse = np.linalg.inv(body.mass)
+    size = body.size
+    state = np.block(
+        [[np.zeros((size, size)), np.eye(size)], [-inverse @ stiffness, -speed * inverse @ body.gyroscopic]]
+    )
+    found = np.linalg.eigvals(state).imag / (2.0 * np.pi)
+    return np.sort(found[found > 1.0])
+
+
+def test_gyroscopic_forces_of_a_shaft_follow_from_its_torsional_inertia(tmp_path: Path) -> None:
+    """Against a shaft reduced here with the exact gyroscopic matrix, at 12000 rpm: gyroscopic splitting within 2 %."""
+    content = shaped_shafts()
+    body = assembled(Gearbox.from_dict(content, "case.toml"), Choice("flexible"), STIFFNESS).elastic_bodies["shaft_1"]
+    inertia = body.shape_inertia
+    content["bodies"]["shaft_1"]["inertia"]["disc"] = {
+        "mass_kg": inertia.mass, "axial_kg_m2": inertia.axial, "transverse_kg_m2": inertia.transverse,
+        "centre_of_mass_z_mm": 1e3 * inertia.centre[2],
+    }  # fmt: skip
+    exact = assembled(Gearbox.from_dict(content, "case.toml"), Choice("flexible"), STIFFNESS).elastic_bodies["shaft_1"]
+    content = copy.deepcopy(content)
+    keys = write(tmp_path, interface_of(exact.reduced), "dmig")
+    del content["bodies"]["shaft_1"]["shape"]
+    seats = {"torque": {"node": 1 + [seat.name for seat in exact.reduced.seats].index("torque")}}
+    seats["belt"] = {"node": 1 + [seat.name for seat in exact.reduced.seats].index("belt")}
+    content["bodies"]["shaft_1"]["external"] = {**keys, "units": "SI", "torque_seat": "torque", "seats": seats}
+    gearbox = Gearbox.from_dict(content, str(tmp_path / "case.toml"))
+    found = assembled(gearbox, Choice("flexible"), STIFFNESS).elastic_bodies["shaft_1"]
+    assert found.main_seat == exact.main_seat == "torque"
+    speed = 12000.0 * np.pi / 30.0
+    one, two, rest = (
+        whirl_frequencies(body.reduced, omega) for body, omega in ((found, speed), (exact, speed), (exact, 0.0))
+    )
+    below = two < 4000.0
+    assert np.abs(one[below] / two[below] - 1.0).max() < 0.02 * np.abs(rest[below] / two[below] - 1.0).max()
+    assert any("gyroscopic forces follow" in line for line in external_warnings(gearbox, "shaft_1"))
+
+
+@pytest.mark.parametrize(
+    ("places", "message"),
+    [
+        ([[0.0, 0.0, -0.04], [0.0, 0.0, 0.02], [0.1, 0.0, 0.0]], "a seat is 100 mm off the axis, but 'nonrotating'"),
+        ([[0.0, 0.0, -0.04], [1e-7, 0.0, 0.02], [0.0, 1e-7, 0.06]], "a rotation by 90 degrees changes its stiffness"),
+    ],
+)
+def test_a_shaft_that_is_no_body_of_revolution_is_refused(
+    tmp_path: Path, places: list[list[float]], message: str
+) -> None:
+    beams = beams_between(np.array(places), (1, 2, 3), 0.03)
+    stiffness = beams.stiffness.copy()
+    if places[2][0] == 0.0:  # as if its cross-section was flat: bending is softer about one axis
+        for bent in (1, 3):
+            at = np.arange(bent, 18, 6)
+            stiffness[at] *= 0.8
+            stiffness[:, at] *= 0.8
+    content = shaped_shafts()
+    del content["bodies"]["shaft_1"]["shape"], content["forces"]
+    body = InterfaceMatrices(beams.nodes, beams.positions, (), beams.mass, stiffness)
+    content["bodies"]["shaft_1"]["external"] = {
+        **write(tmp_path, body), "units": "SI", "seats": {"pinion": {"node": 2}, "bearing_1": {"node": 1}},
+    }  # fmt: skip
+    with pytest.raises(GearboxFileError, match=message):
+        bodies_of(Gearbox.from_dict(content, str(tmp_path / "case.toml")), Choice("flexible"))
+
+
+def ring_of_beams() -> InterfaceMatrices:
+    """Nodes 101 to 109 around a ring, referred to its centre by rigid arms, and nodes 1 and 2 at its front and rear."""
+    centre = np.array([0.0, 0.0, MIDDLE])
+    angles = 2.0 * np.pi * np.arange(9) / 9
+    around = centre + OUTER * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(9)])
+    places = np.vstack([around, centre - (0.0, 0.0, FACE / 2.0), centre + (0.001, 0.0, FACE / 2.0)])
+    beams = beams_between(places, (*range(101, 110), 1, 2), 0.05)
+    arms = np.eye(beams.size)
+    for n, (x, y, z) in enumerate(around - centre):
+        arms[6 * n : 6 * n + 3, 6 * n + 3 : 6 * n + 6] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
+    at_centre = np.vstack([np.tile(centre, (9, 1)), places[9:]])
+    return InterfaceMatrices(beams.nodes, at_centre, (), arms.T @ beams.mass @ arms, arms.T @ beams.stiffness @ arms)
+
+
+def test_a_ring_from_matrices_has_sectors(tmp_path: Path, grc: Gearbox, stiffness: dict[str, np.ndarray]) -> None:
+    ring = ring_of_beams()
+    content = ring_content(grc, tmp_path)
+    del content["bodies"]["housing"]["solid"]
+    external = {**write(tmp_path, ring), "units": "SI"}
+    content["bodies"]["housing"]["external"] = external
+    external["seats"] = {"ring": {"sector_nodes": list(range(101, 110))}, "front": {"node": 1}, "rear": {"node": 2}}
+    gearbox = Gearbox.from_dict(content, str(tmp_path / "case.toml"))
+    check_external(gearbox, "housing")
+    found = bodies_of(gearbox, Choice("flexible"))["housing"]
+    assert found.sectors == {"ring": tuple(f"ring_{n}" for n in range(1, 10))}
+    assert [seat.name for seat in found.reduced.seats] == [*found.sectors["ring"], "front", "rear"]
+    wanted = ring.stiffness
+    scale = np.sqrt(np.diag(wanted))
+    assert np.abs((found.reduced.stiffness - wanted) / np.outer(scale, scale)).max() < 1e-12
+    bushing = assembled(gearbox, Choice("bushing"), stiffness)
+    assert unsuitable(bushing, ("housing",)) == ELASTIC_RING
+
+
+@pytest.mark.parametrize(
+    ("seats", "message"),
+    [
+        ({"front": {"node": 1}, "rear": {"node": 2}}, r"seats.ring: nodes 101, 102, .* 109 are all at .* set node"),
+        ({"ring": {"sector_nodes": [101, 102, 1]}, "front": {"node": 103}}, "sector node 1 is 115 mm from the centre"),
+    ],
+)
+def test_sectors_that_are_not_named_or_not_at_the_centre_are_refused(
+    tmp_path: Path, grc: Gearbox, seats: dict[str, Any], message: str
+) -> None:
+    content = ring_content(grc, tmp_path)
+    del content["bodies"]["housing"]["solid"]
+    content["bodies"]["housing"]["external"] = {**write(tmp_path, ring_of_beams()), "units": "SI", "seats": seats}
+    content["bodies"]["housing"]["external"]["seats"].setdefault("rear", {"node": 2})
+    with pytest.raises(GearboxFileError, match=message):
+        check_external(Gearbox.from_dict(content, str(tmp_path / "case.toml")), "housing")
+
+
+# What is refused
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"file": "missing.npz"}, r"bodies.box.external.file = 'missing.npz': no such file"),
+        ({"file": "../box.npz"}, r"external.file = '../box.npz': is outside the folder"),
+        ({"units": None}, r"bodies.box.external.units"),
+        ({"units": "mm"}, r"bodies.box.external.units"),
+        ({"file": None}, r"requires its matrices; set file, or stiffness and mass"),
+        ({"stiffness": "box.npz"}, r"set either file, or stiffness and mass"),
+        ({"nodes": "box.npz", "units": "mm-t-s"}, r"seats.bearing_1: no node at|nodes .* are all at"),
+        ({"shift_mm": [1.0, 0.0, 0.0]}, r"external: seats.bearing_1: no node at \(0, 0, 0\) mm; the nearest is node 1"),
+        ({"seats": {}}, r"seats.foot: no node at \(50, 0, -40\) mm; the nearest is node 3 at a distance of 28 mm"),
+        ({"seats": {"foot": {"node": 9}}}, r"seats.foot.node = 9: no such node; nodes are 1, 2, 3"),
+        ({"seats": {"foot": {"node": 1}}}, r"seats.foot: node 1 is also that of bearing_1; set same_as = 'bearing_1'"),
+        ({"seats": {"foot": {"node": 3, "same_as": "bearing_1"}}}, r"set one of node, position_mm"),
+        ({"seats": {"foot": {"same_as": "nothing"}}}, r"foot.same_as = 'nothing': no such seat; seats are bearing_1"),
+        ({"seats": {"foot": {"sector_nodes": [1, 2, 3]}}}, r"foot.sector_nodes: only the seat of a gear has sectors"),
+        ({"seats": {"foot": {"sector_nodes": [1, 2]}}}, r"sector_nodes must be an odd number"),
+        ({"seats": {**FOOT, "other": {}}}, r"seats.other: no gear, bearing or mount of the body is named 'other'"),
+        ({"torque_seat": "top"}, r"torque_seat = 'top': no such seat; seats are bearing_1, bearing_2, foot"),
+        ({"stated_mass_kg": 0.6}, r"stated_mass_kg = 0.6: the matrices have 0.58875 kg; check units and model"),
+        ({"stated_centre_mm": [40.0, 0.0, -6.0]}, r"the matrices have their centre at \(37.5, .*, -6\) mm"),
+        ({"stiffness_name": "KUUX"}, r"no stiffness matrix named KUUX; matrices are stiffness, mass"),
+    ],
+)  # fmt: skip
+def test_a_body_that_cannot_be_is_one_error_with_its_key(
+    tmp_path: Path, box: InterfaceMatrices, change: dict[str, Any], message: str
+) -> None:
+    keys = {"units": "SI", "seats": FOOT, **write(tmp_path, box), **change}
+    content = box_content(tmp_path)
+    del content["bodies"]["box"]["solid"]
+    content["bodies"]["box"]["external"] = {key: value for key, value in keys.items() if value is not None}
+    with pytest.raises(GearboxFileError, match=message) as refused:
+        check_external(Gearbox.from_dict(content, str(tmp_path / "case.toml")), "box")
+    assert len(refused.value.errors) == 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"flexibility": "ffrf", "fixed": False}, "flexibility 'ffrf' requires mass integrals"),
+        ({"spin_only": True, "fixed": False}, "external matrices are for a body on a fixed axis or a fixed body"),
+        ({"solid": {"file": "plate.vtu"}}, "set one of shape, solid and external"),
+    ],
+)
+def test_bodies_that_matrices_cannot_be_are_refused(
+    tmp_path: Path, box: InterfaceMatrices, changes: dict[str, Any], message: str
+) -> None:
+    content = box_content(tmp_path)
+    del content["bodies"]["box"]["solid"]
+    content["bodies"]["box"] |= {"external": {**write(tmp_path, box), "units": "SI"}, **changes}
+    with pytest.raises(GearboxFileError, match=message):
+        Gearbox.from_dict(content, str(tmp_path / "case.toml"))
+
+
+def test_matrices_that_fail_a_check_are_refused_before_anything_is_computed(
+    tmp_path: Path, box: InterfaceMatrices
+) -> None:
+    stiffness = box.stiffness.copy()
+    stiffness[:3, :3] += 1e7 * np.eye(3)
+    keys = write(tmp_path, InterfaceMatrices(box.nodes, box.positions, box.modal, box.mass, stiffness))
+    gearbox = box_of(tmp_path, keys)
+    with pytest.raises(GearboxFileError, match="bodies.box.external: stiffness: 3 motions are free"):
+        check_external(gearbox, "box")
+
+
+def test_what_an_rbe2_does_and_what_is_unusual_is_said(tmp_path: Path, box: InterfaceMatrices) -> None:
+    spare = beams_between(np.vstack([box.positions, [[0.02, 0.02, 0.0]]]), (1, 2, 3, 44), 0.02)
+    gearbox = box_of(tmp_path, {**write(tmp_path, spare), "constraint": "rbe2"})
+    check_external(gearbox, "box")
+    said = list(external_warnings(gearbox, "box"))
+    assert any("constraint = 'rbe2': RBE2 makes each seat rigid" in line for line in said)
+    assert any("nodes 44 carry nothing and remain free" in line for line in said)
+    wrong = box_of(tmp_path, {**write(tmp_path, box), "seats": {name: {"node": n} for n, name in
+                                                             enumerate(("bearing_1", "bearing_2", "foot"), start=1)},
+                              "units": "inch-lbf-s"})  # fmt: skip
+    assert any("check units" in line for line in external_warnings(wrong, "box"))
+
+
+def test_loads_and_matrices_have_the_same_node_numbers(tmp_path: Path, box: InterfaceMatrices) -> None:
+    content = box_content(tmp_path)
+    assert node_numbers(Gearbox.from_dict(content, str(tmp_path / "case.toml")), "box") == {
+        "bearing_1": 1, "bearing_2": 2, "foot": 3,
+    }  # fmt: skip
+    renumbered = InterfaceMatrices((70, 8, 55), box.positions, box.modal, box.mass, box.stiffness)
+    seats = {"bearing_1": {"node": 70}, "bearing_2": {"same_as": "bearing_1"}, "foot": {"node": 55}}
+    gearbox = box_of(tmp_path, {**write(tmp_path, renumbered), "seats": seats})
+    assert node_numbers(gearbox, "box") == {"bearing_1": 70, "bearing_2": 70, "foot": 55}
+
+
+def test_other_files_are_other_results(tmp_path: Path, box: InterfaceMatrices) -> None:
+    hashes = []
+    for factor in (1.0, 1.01):
+        keys = write(tmp_path, InterfaceMatrices(box.nodes, box.positions, box.modal, factor * box.mass, box.stiffness))
+        hashes.append(input_hash(assembled(box_of(tmp_path, keys), Choice("flexible"), STIFFNESS)))
+    assert hashes[0] != hashes[1]
+
+
+def test_pictures_show_the_nodes(tmp_path: Path, box: InterfaceMatrices) -> None:
+    assembly = assembled(box_of(tmp_path, write(tmp_path, box)), Choice("flexible"), STIFFNESS)
+    surface = assembly.elastic_bodies["box"].reduced.surface
+    assert surface.points[:18].reshape(3, 6, 3).mean(axis=1) == pytest.approx(box.positions)
+    # Bars from the foot, at (50, 0, -12) mm, to both bearings: 51.4 and 27.7 mm are shorter than 75 mm.
+    ends = surface.points[18:].reshape(2, 2, 4, 3).mean(axis=2)
+    assert sorted(np.linalg.norm(np.diff(ends, axis=1)[:, 0], axis=1)) == pytest.approx([0.02773, 0.05142], abs=1e-5)
+    rigid = surface.displacement @ assembly.elastic_bodies["box"].reduced.rigid_motions((0.0, 0.0, 0.0))
+    assert rigid[:, :, 5] == pytest.approx(np.cross([0.0, 0.0, 1.0], surface.points), abs=1e-7)
+    scene = elastic_scene(assembly, modes_of(assembly).shapes[:, 3])
+    assert len(scene.bodies[0].quads) == 3 * 8 + 2 * 4  # seen from every side
+
+
+# Command line
+
+
+def exugear(*arguments: object) -> Any:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def toml(content: Mapping[str, Any]) -> str:
+    from ...cases.case_mutations import toml_text
+
+    return toml_text(dict(content))
+
+
+def test_export_writes_what_the_gearbox_file_reads(tmp_path: Path) -> None:
+    case = tmp_path / "case.toml"
+    content = box_content(tmp_path)
+    case.write_text(toml(content), encoding="utf-8")
+    wanted = ("--matrices", "box", "--format", "dmig", "--units", "mm-t-s", "--to", tmp_path)
+    out = exugear("export", case, *wanted, "--out", tmp_path / "results", "--json")
+    assert out.exit_code == 0, out.stderr
+    said = json.loads(out.stdout)
+    assert said["mass_kg"] == pytest.approx(0.58875)
+    assert [(seat["node"], seat["seat"]) for seat in said["seats"]] == [(1, "bearing_1"), (2, "bearing_2"), (3, "foot")]
+    assert said["files"] == [str(tmp_path / "box.pch")]
+    del content["bodies"]["box"]["solid"]
+    content["bodies"]["box"]["external"] = {**said["keys"], "units": said["units"], "seats": FOOT}
+    case.write_text(toml(content), encoding="utf-8")
+    check = exugear("check", case, "--json")
+    assert check.exit_code == 0, check.stderr
+    summary = json.loads(check.stdout)
+    assert summary["variants"]["flexible"] == ""
+    assert "bodies.box.external: 3 nodes" in summary["matrices"][0]
+    assert "0.58875 kg, centre of mass at (37.5, " in summary["matrices"][0]
+    again = exugear("export", case, "--matrices", "box", "--format", "dmig", "--to", tmp_path)
+    assert again.exit_code == 2
+    assert "box.pch: exists already; specify another folder with --to" in again.stderr.replace("\n", " ")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--matrices", "lid"), "--matrices lid: no such flexible body; flexible bodies are box"),
+        (("--matrices", "box", "file.rexs"), "--matrices box: omit file.rexs"),
+        ((), "nothing to export; name a REXS file, a body with --matrices BODY, or --loads FILE.nc"),
+    ],
+)
+def test_an_export_that_cannot_be_is_refused_and_writes_nothing(
+    tmp_path: Path, arguments: tuple[str, ...], message: str
+) -> None:
+    case = tmp_path / "case.toml"
+    case.write_text(toml(box_content(tmp_path)), encoding="utf-8")
+    before = sorted(tmp_path.rglob("*"))
+    out = exugear("export", case, *arguments, "--out", tmp_path / "results")
+    assert out.exit_code == 2
+    assert message in " ".join(out.stderr.split())
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_damaged_matrices_are_bad_input_of_every_command(tmp_path: Path, box: InterfaceMatrices) -> None:
+    keys = write(tmp_path, box, "op4")
+    file = tmp_path / "box.op4"
+    file.write_bytes(file.read_bytes()[:2000])
+    gearbox = box_of(tmp_path, keys)
+    case = tmp_path / "case.toml"
+    case.write_text(toml(gearbox.content), encoding="utf-8")
+    for verb in (
+        ("check",),
+        ("modes", "--variant", "flexible", "--mesh-model", "iso6336", "--out", tmp_path / "results"),
+    ):
+        out = exugear(verb[0], case, *verb[1:])
+        assert out.exit_code == 2, out.stdout
+        assert "bodies.box.external" in out.stderr
+        assert "it is truncated" in " ".join(out.stderr.split())
+    assert not (tmp_path / "results").exists()
