@@ -32,6 +32,10 @@ TOLERANCE = 1e-9
 """Residual of the balance over the static deflections."""
 POSITIONS_REPEATED = 2
 """Solutions after the first one, with positions in the mesh cycle that move with the orders of shafts."""
+LARGEST_SHIFT = 0.1
+"""Motion of a position, mesh cycles, above which forces are not linear in it: it is neglected there.
+
+Near standstill a stated torque turns the free gear train that far."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,6 +148,8 @@ def forces_of_positions(model: HarmonicBalanceModel, response: Response) -> Comp
         changes += _products(model, pulls, ports, speed, _everywhere(model, shape))
     positions = response.motion @ ports.readings[: shape[1], POSITION].T
     lines, coupling = model.slow_shifts
+    if (2.0 * np.abs(positions[lines])).sum(axis=0).max(initial=0.0) > LARGEST_SHIFT:
+        return np.zeros(shape, dtype=complex)
     shifts = np.concatenate([positions[lines], positions[lines].conj()])
     # What two signals of a family of planets multiply to: each wave by the mean of the other.
     mean = [next(n for n, own in enumerate(waves.waves) if own.first == wave.first) for wave in waves.waves]
@@ -317,3 +323,16 @@ def dissipated_and_given(model: HarmonicBalanceModel, response: Response) -> tup
     if interface.loads is not None:
         given += 2.0 * float(np.sum((interface.loads.loads[1:] * rates.conj()).real))
     return taken, given
+
+
+def exchanged_power(response: Response) -> float:
+    """Power that loads beside the meshes exchange with the motion, in either sense and without regard to phase, W.
+
+    Where a torque turns the free gear train near standstill it is many times what the dampers dissipate, so that the
+    round-off of the stiffness is larger than these.
+    """
+    interface = response.interface
+    if interface.loads is None:
+        return 0.0
+    rates = interface.frequencies[1:, None] * response.motion[1:]
+    return 2.0 * float(np.sum(np.abs(interface.loads.loads[1:] * rates)))

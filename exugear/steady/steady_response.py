@@ -35,7 +35,7 @@ from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.mean_system.signals import SignalName
 from exugear.steady.nonlinear import HarmonicResidual, Tangent, growth_of_state
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
-from exugear.steady.response import Response, dissipated_and_given, signals
+from exugear.steady.response import Response, dissipated_and_given, exchanged_power, signals
 from exugear.steady.settings import SteadySettings, check_deviations, check_law, check_speeds
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers, SingleComplexes, Texts
@@ -272,6 +272,8 @@ SLOWEST_BRANCH = 0.01
 """Share of the fastest speed at which a branch from standstill begins."""
 LONGEST_WARNING = 300
 """Letters of a remark."""
+RESOLVED = 1e-4
+"""Share of the exchanged power below which dissipated power is round-off."""
 AT_ONCE = 8
 """Points that two threads solve before progress is shown."""
 Kept = Callable[[SolvedPoints], None]
@@ -519,4 +521,5 @@ def _fill(out: SolvedPoints, n: int, model: HarmonicBalanceModel, response: Resp
     out.products[n] = response.products
     out.apart[n] = response.apart
     out.free[n] = response.free
-    out.energy_error[n] = (taken - given) / max(abs(taken), abs(given), 1e-300)
+    least = max(RESOLVED * exchanged_power(response), 1e-300)
+    out.energy_error[n] = (taken - given) / max(abs(taken), abs(given), least)

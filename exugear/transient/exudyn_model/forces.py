@@ -146,7 +146,7 @@ def add_loads(parts: Parts, loads: LoadTable) -> None:
     ]
     if loads.drive is not None:
         by_state.append((loads.drive.body, loads.drive.stiffness, loads.drive.damping, loads.drive.torque))
-    for body, stiffness, damping, torque in by_state:
+    for body, stiffness, damping, law in by_state:
         if body not in elsewhere:
             fixed = parts.mbs.AddNode(items.NodePointGround())
             ground = parts.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=fixed, coordinate=0))
@@ -155,7 +155,7 @@ def add_loads(parts: Parts, loads: LoadTable) -> None:
                     markerNumbers=[ground, parts.spin_marker(body)],
                     stiffness=stiffness,
                     damping=damping,
-                    springForceUserFunction=_torque_function(torque),
+                    springForceUserFunction=_torque_function(law),
                 )
             )
 
