@@ -24,7 +24,7 @@ from exugear.steady.harmonics.branches import NEIGHBOURS, predicted_top, standin
 from exugear.steady.mean_system.mean_system import MeanSystem, mean_modes
 from exugear.steady.mean_system.mesh_places import DEFLECTION
 from exugear.steady.mean_system.signals import Quantity
-from exugear.steady.response import mean_wheel_error_forces, transmission_errors
+from exugear.steady.response import mean_deviation_forces, transmission_errors
 from exugear.system.statics import linearise
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, SingleComplexes
 from fe_ste.tools.threads import side_by_side
@@ -315,7 +315,7 @@ def contributions(model: HarmonicBalanceModel, speed: float, line: int) -> Contr
     parts = (adjoint @ forces).reshape(len(model.waves.waves), -1).sum(axis=1)
     for wave, part in zip(model.waves.waves, parts, strict=True):
         meshes[wave.family] = meshes.get(wave.family, 0.0) + _share(complex(part), total)
-    for source in dict.fromkeys(filter(None, model.errors.source)):
+    for source in dict.fromkeys(filter(None, model.shaft_orders.source)):
         if part := complex(2.0 * adjoint @ _loads_beside(model, speed, source)[line]):
             meshes[source] = meshes.get(source, 0.0) + _share(part, total)
     supports, bodies = _derivatives(model, speed, frequency, adjoint, motion, total)
@@ -346,18 +346,18 @@ def _excitation(model: HarmonicBalanceModel, speed: float, line: int) -> tuple[C
     """Generalized peak forces of each wave (size, m f) on a line, and their sum (size,)."""
     ports = model.ports_at(speed)
     excess = transmission_errors(model, ports, speed)[line]
-    excess[:, DEFLECTION] += mean_wheel_error_forces(model, speed)[line]
+    excess[:, DEFLECTION] += mean_deviation_forces(model, speed)[line]
     forces = -2.0 * model.loads(ports) * excess.ravel()
     return forces, np.asarray(forces.sum(axis=1) + 2.0 * _loads_beside(model, speed)[line])
 
 
 def _loads_beside(model: HarmonicBalanceModel, speed: float, source: str | None = None) -> Complexes:
     """Generalized forces (n, size) beside those of the meshes: of deviations and stated torques, or of one torque."""
-    errors = model.errors
-    if not errors.sidebands:
+    slow = model.shaft_orders
+    if not slow.sidebands:
         return np.zeros((len(model.lines.index), model.system.size), dtype=complex)
-    counted = np.array([source in (None, name) for name in errors.source])
-    return errors.at_lines(errors.reaction * counted[:, None], model.lines, len(model.waves.base_orders), speed)
+    counted = np.array([source in (None, name) for name in slow.source])
+    return slow.at_lines(slow.reaction * counted[:, None], model.lines, len(model.waves.base_orders), speed)
 
 
 def _share(part: complex, total: complex) -> float:

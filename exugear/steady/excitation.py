@@ -49,6 +49,7 @@ from exugear.steady.mean_system.mesh_places import (
     mesh_ports,
 )
 from exugear.steady.mean_system.mesh_waves import MeshWaves, mesh_waves
+from exugear.steady.mean_system.shaft_orders import ShaftOrders
 from exugear.steady.mean_system.signals import (
     AXES,
     SURFACE_VELOCITY,
@@ -61,7 +62,6 @@ from exugear.steady.mean_system.signals import (
     signal_rows,
 )
 from exugear.steady.mean_system.tooth_friction import tooth_friction
-from exugear.steady.mean_system.wheel_errors import WheelErrors
 from exugear.system.kernels.meshes import SPIN_1
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
@@ -186,7 +186,7 @@ class HarmonicBalanceModel:
     ----------
     harmonics : of each mesh frequency. The mesh stiffness has twice as many.
     combinations : largest sum of multiples of several mesh frequencies
-    errors : deviations of gears and stated torques, which add orders of shafts
+    orders : orders of shafts, by deviations of gears and stated torques
 
     Notes
     -----
@@ -194,9 +194,9 @@ class HarmonicBalanceModel:
     of the meshes in all arrays.
     """
 
-    def __init__(self, waves: MeshWaves, harmonics: int, combinations: int, errors: WheelErrors | None = None) -> None:
+    def __init__(self, waves: MeshWaves, harmonics: int, combinations: int, orders: ShaftOrders | None = None) -> None:
         self.waves, self.harmonics = waves, 2 * harmonics
-        self.errors = errors or WheelErrors()
+        self.shaft_orders = orders or ShaftOrders()
         # Lines of the larger set are kept apart where forces are evaluated in time.
         self._usual = self._reach = HarmonicTruncation(2 * harmonics, 2 * combinations)
         self.lines, self.larger = (
@@ -353,13 +353,13 @@ class HarmonicBalanceModel:
         lines = line_set(waves.base_orders.tolist(), reach.harmonics, reach.combinations)
         modulators = [planets for _, planets in waves.carriers]
         lines = beside(lines, modulators, 0) if waves.passing else modulated(lines, modulators)
-        errors = self.errors
-        return with_rotations(lines, errors.rotations, errors.sidebands, len(waves.base_orders), reach.harmonics)
+        slow = self.shaft_orders
+        return with_rotations(lines, slow.rotations, slow.sidebands, len(waves.base_orders), reach.harmonics)
 
     @cached_property
-    def without_errors(self) -> HarmonicBalanceModel:
+    def without_shaft_orders(self) -> HarmonicBalanceModel:
         """The same gearbox with gears that have no deviations; itself if they have none."""
-        if not self.errors.sidebands:
+        if not self.shaft_orders.sidebands:
             return self
         return HarmonicBalanceModel(self.waves, self.usual_harmonics, self._usual.combinations // 2)
 
@@ -437,7 +437,7 @@ class HarmonicBalanceModel:
     @property
     def base_names(self) -> tuple[str, ...]:
         """Names of all bases: meshes, carriers of planets out of phase, rotations of gears with deviations."""
-        return (*self.waves.base_names, *(name for name, _ in self.waves.carriers), *self.errors.names)
+        return (*self.waves.base_names, *(name for name, _ in self.waves.carriers), *self.shaft_orders.names)
 
     @property
     def system(self) -> MeanSystem:
@@ -604,14 +604,14 @@ class HarmonicBalanceModel:
     def _loads_beside(self) -> Complexes:
         """Generalized forces (3, n, size) at the three speeds of friction and of deviations; empty without either."""
         has_friction = self.waves.assembly.gearbox.case.damping.tooth_friction != 0.0
-        if not (has_friction or self.errors.sidebands):
+        if not (has_friction or self.shaft_orders.sidebands):
             return np.zeros((0, 0, 0), dtype=complex)
         meshes = len(self.waves.base_orders)
         found = []
         for speed in map(float, self.system.speeds):
             loads = np.zeros((len(self.lines.index), self.system.size), dtype=complex)
-            if self.errors.sidebands:
-                loads += self.errors.at_lines(self.errors.reaction, self.lines, meshes, speed)
+            if self.shaft_orders.sidebands:
+                loads += self.shaft_orders.at_lines(self.shaft_orders.reaction, self.lines, meshes, speed)
             if has_friction:
                 loads += tooth_friction(self.waves, self.lines, self.ports_at(speed), speed, self.harmonics)
             found.append(loads)
@@ -621,11 +621,11 @@ class HarmonicBalanceModel:
     def _displacements(self) -> Complexes:
         """Deviations (n, m) of gears at the lines where the input turns about +z, m."""
         waves = self.waves
-        if not self.errors.sidebands:
+        if not self.shaft_orders.sidebands:
             return np.zeros((len(self.lines.index), len(waves.waves)), dtype=complex)
-        return self.errors.at_lines(self.errors.displacement, self.lines, len(waves.base_orders), 1.0)
+        return self.shaft_orders.at_lines(self.shaft_orders.displacement, self.lines, len(waves.base_orders), 1.0)
 
-    def wheel_displacements(self, speed: float) -> Complexes:
+    def deviations(self, speed: float) -> Complexes:
         """Deviations (n, m) of gears in the meshes at the lines, at a speed of the input (rad/s), m."""
         return self._displacements if speed > 0.0 else self._displacements.conj()
 

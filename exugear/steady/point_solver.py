@@ -20,7 +20,7 @@ from exugear.steady.harmonics.lines import LineSet, TorusSampling, joined, large
 from exugear.steady.mean_system.mean_system import mean_system
 from exugear.steady.mean_system.mesh_places import DEFLECTION
 from exugear.steady.mean_system.mesh_waves import FEWEST, mesh_waves
-from exugear.steady.mean_system.wheel_errors import wheel_errors, without_wheel_errors
+from exugear.steady.mean_system.shaft_orders import shaft_orders, without_deviations
 from exugear.steady.nonlinear import (
     CHECKED,
     HarmonicResidual,
@@ -35,7 +35,7 @@ from exugear.steady.nonlinear import (
 from exugear.steady.response import (
     Response,
     linear_response,
-    mean_wheel_error_forces,
+    mean_deviation_forces,
     parametric_response,
     signals,
     transmission_errors,
@@ -85,10 +85,10 @@ def harmonic_balance_model(
 
     With contact loss, each state takes as many orders as it needs, starting with few.
     """
-    waves = mesh_waves(mean_system(without_wheel_errors(assembly), speeds))
+    waves = mesh_waves(mean_system(without_deviations(assembly), speeds))
     usual = FEWEST if LAWS[assembly.mesh_model].loses_contact else waves.needed_harmonics()
-    errors = wheel_errors(assembly, waves)
-    return HarmonicBalanceModel(waves, usual if harmonics is None else harmonics, combinations, errors)
+    count = usual if harmonics is None else harmonics
+    return HarmonicBalanceModel(waves, count, combinations, shaft_orders(assembly, waves))
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,14 +149,14 @@ class PointSolver:
         """Find the forces of the meshes (lines, m, f) that vary in the static state, N, bearings being linear."""
         if not self.linear.loses_contact:
             forces = transmission_errors(self.linear, interface.ports, interface.speed)
-            forces[..., DEFLECTION] += mean_wheel_error_forces(self.linear, interface.speed)
+            forces[..., DEFLECTION] += mean_deviation_forces(self.linear, interface.speed)
             return forces
         balance = HarmonicResidual(self.linear, interface, self.linear.sampling)
         return balance.forces(balance.static)[0]
 
     def growth(self, low: float, high: float) -> float:
         """Fastest growth of a disturbance between two speeds of the input (rad/s), 1/s."""
-        model = self.linear.without_errors
+        model = self.linear.without_shaft_orders
         found = [mean_growth(model)]
         unknown = model.loses_contact or model.waves.carriers
         for candidate in () if unknown else candidates(model, low, high)[:CHECKED]:

@@ -10,7 +10,7 @@ curve of load over deflection is replaced by its tangent k(pmc) at the static lo
 
     force k d - (m - 1) F_0 = k (d - e),  e = s - F_0 / k,  s the static transmission error.
 
-Deviations of gears are a given displacement in both methods: see `exugear.steady.mean_system.wheel_errors`.
+Deviations of gears are a given displacement in both methods: see `exugear.steady.mean_system.shaft_orders`.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def linear_response(model: HarmonicBalanceModel, interface: Interface) -> Respon
     w, s contains w (g - g0), and F_0 w is a moment.
     """
     excess = transmission_errors(model, interface.ports, interface.speed)
-    excess[..., DEFLECTION] += mean_wheel_error_forces(model, interface.speed)
+    excess[..., DEFLECTION] += mean_deviation_forces(model, interface.speed)
     deflection = interface.static[..., DEFLECTION] + _answer(interface, excess)[..., DEFLECTION]
     return _response(model, interface, deflection, excess, 0)
 
@@ -108,22 +108,22 @@ def transmission_errors(model: HarmonicBalanceModel, ports: MeshInterface, speed
     return found
 
 
-def mean_wheel_error_forces(model: HarmonicBalanceModel, speed: float) -> Complexes:
+def mean_deviation_forces(model: HarmonicBalanceModel, speed: float) -> Complexes:
     """Find the forces (n, m) of the deviations of gears in the averaged system, -k_mean e - c e', N."""
     frequencies = abs(speed) * model.lines.orders
     stiffness = model.waves.mean_stiffness + 1j * frequencies[:, None] * model.waves.damping
-    return np.asarray(-stiffness * model.wheel_displacements(speed))
+    return np.asarray(-stiffness * model.deviations(speed))
 
 
-def wheel_error_forces(model: HarmonicBalanceModel, interface: Interface) -> Complexes:
+def deviation_forces(model: HarmonicBalanceModel, interface: Interface) -> Complexes:
     """Find the forces (n, m, f) of the deviations of gears, -k e - c e' with k over the mesh cycle, N and N m."""
     ports = interface.ports
     forces = np.zeros((len(model.lines.index), *ports.forces.shape[:2]), dtype=complex)
-    if not model.errors.sidebands:
+    if not model.shaft_orders.sidebands:
         return forces
     errors = forces.copy()
-    errors[..., DEFLECTION] = model.wheel_displacements(interface.speed)
-    forces[..., DEFLECTION] = mean_wheel_error_forces(model, interface.speed)
+    errors[..., DEFLECTION] = model.deviations(interface.speed)
+    forces[..., DEFLECTION] = mean_deviation_forces(model, interface.speed)
     beyond = _slopes_beyond_mean(model, interface)
     return forces - model.coupling.of(beyond, errors.reshape(len(errors), -1)).reshape(forces.shape)
 
@@ -140,7 +140,7 @@ def forces_of_positions(model: HarmonicBalanceModel, response: Response) -> Comp
     shape = len(model.lines.index), *ports.forces.shape[:2]
     derivative = 2j * np.pi * np.arange(model.harmonics + 1)
     deflection = np.zeros(shape, dtype=complex)
-    deflection[..., DEFLECTION] = response.deflection - model.wheel_displacements(speed)
+    deflection[..., DEFLECTION] = response.deflection - model.deviations(speed)
     slopes = {(DEFLECTION, DEFLECTION): derivative * model.cycle_coefficients}
     changes = _products(model, slopes, ports, speed, deflection)
     if waves.loads.any():
@@ -208,19 +208,19 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
         add_answered(cached_bundle(coupling.terms), *parts, readings, *memory, octets, out)
         return out
 
-    given = given_forces(model, interface) + wheel_error_forces(model, interface)
+    given = given_forces(model, interface) + deviation_forces(model, interface)
     still = lengths * interface.static[..., : shape[2]].reshape(shape[0], -1)
     moved = np.zeros_like(given)
     found = None
     products = 0
-    for _ in range(1 + (POSITIONS_REPEATED if model.errors.sidebands else 0)):
+    for _ in range(1 + (POSITIONS_REPEATED if model.shaft_orders.sidebands else 0)):
         whole = (given + moved).reshape(shape[0], -1)
         start = still - (answers @ whole[..., None])[..., 0]
         found, more = solve_lines(apply, start, TOLERANCE, found)
         products += more
         excess = (whole + coupling.of(scaled, found)).reshape(shape)
         response = _response(model, interface, (found / lengths).reshape(shape)[..., DEFLECTION], excess, products)
-        if model.errors.sidebands:
+        if model.shaft_orders.sidebands:
             moved = forces_of_positions(model, response)
     return response
 
@@ -291,8 +291,8 @@ def signals(model: HarmonicBalanceModel, response: Response) -> Complexes:
     if levers.any():
         deflection = deflection + response.motion @ levers[:, :-1].T
         deflection[0] += levers[:, -1]
-    if model.errors.sidebands:
-        deflection = deflection - model.wheel_displacements(interface.speed)
+    if model.shaft_orders.sidebands:
+        deflection = deflection - model.deviations(interface.speed)
     found = [of_motion, deflection, response.force]
     if model.radiated is not None:
         # A line of a coefficient c oscillates with the amplitude 2 c.

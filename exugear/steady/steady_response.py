@@ -308,7 +308,7 @@ def response_of(
     tracks = _tracks(model, even)
     operation = operating_range(assembly.gearbox)
     at_resonances = settings.at_resonances and (
-        model.loses_contact or model.waves.varies or bool(model.errors.sidebands)
+        model.loses_contact or model.waves.varies or bool(model.shaft_orders.sidebands)
     )
     found = crossings(model, tracks, solver.forcing, operation) if at_resonances else ()
     folds: tuple[float, ...] = ()
@@ -341,7 +341,7 @@ def response_of(
         input_hash=settings.hash_with(assembly),
         lines=model.lines,
         base_names=model.base_names,
-        shafts=len(model.errors.rotations),
+        shafts=len(model.shaft_orders.rotations),
         wave_names=tuple(wave.name for wave in model.waves.waves),
         signals=model.signal_names,
         bearing_names=solver.model.bearing_names,

@@ -73,7 +73,7 @@ def drive_of(model, response):
 def torque_of_errors(model, response):
     """Mean torque of the drive, N m, that mesh forces take along the deviations e of gears: F de/dt over the speed."""
     own = response.interface
-    errors = model.wheel_displacements(own.speed)
+    errors = model.deviations(own.speed)
     rates = 1j * own.frequencies[:, None] * errors
     force = response.force / model.waves.line_of_action
     power = 2.0 * float(np.sum((force[1:] * rates[1:].conj()).real))

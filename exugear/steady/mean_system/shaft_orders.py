@@ -41,7 +41,7 @@ LEAST = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class WheelErrors:
+class ShaftOrders:
     """Deviations of gears and stated torques as Fourier series of the angles of rotations; without any, it is empty.
 
     Values hold where the input turns about +z; where it turns about -z, they are the conjugates.
@@ -80,7 +80,7 @@ class WheelErrors:
         return found
 
 
-def without_wheel_errors(assembly: Assembly) -> Assembly:
+def without_deviations(assembly: Assembly) -> Assembly:
     """Return an assembly whose gears have no deviations."""
     none = (np.zeros(0), np.zeros(0))
     elements = tuple(replace(element, errors=none) for element in assembly.elements)
@@ -88,7 +88,7 @@ def without_wheel_errors(assembly: Assembly) -> Assembly:
     return replace(assembly, elements=elements, meshes=assembly.meshes._replace(error_pieces=no_pieces))
 
 
-def wheel_errors(assembly: Assembly, waves: MeshWaves) -> WheelErrors:
+def shaft_orders(assembly: Assembly, waves: MeshWaves) -> ShaftOrders:
     """Find the deviations of an assembly's gears and the stated torques, and the orders that matter.
 
     Parameters
@@ -173,7 +173,7 @@ class _Series:
         self._add(self.reaction, (torque.excitation, key), 0.5 * torque.amplitude * np.exp(1j * phase) * row)
         self.beside += [(key, base, REACH) for base in range(len(self.waves.base_orders))]
 
-    def found(self) -> WheelErrors:
+    def found(self) -> ShaftOrders:
         """Return what was collected."""
         names = list(self.orders)
         carriers = len(self.waves.carriers)
@@ -183,8 +183,8 @@ class _Series:
             return tuple(multiples.get(name, 0) for name in names)
 
         if not self.displacement:
-            return WheelErrors()
-        return WheelErrors(
+            return ShaftOrders()
+        return ShaftOrders(
             tuple(Rotation(name, self.orders[name]) for name in names[carriers:]),
             tuple(Sidebands(row(key), base, reach) for key, base, reach in self.beside),
             np.array([row(key) for _, key in self.displacement], dtype=np.int64).reshape(len(self.displacement), -1),
