@@ -69,6 +69,15 @@ _BY_QUANTITY: Final[dict[str, dict[str, float]]] = {
     "viscosity": {"mm2/s": 1e-6},
     "temperature": {"C": 1.0},
 }
+MEASURED_UNITS: Final = {
+    "acceleration": ("acceleration", "m/s2 or g"),
+    "velocity": ("velocity", "m/s or mm/s"),
+    "displacement": ("length", "um"),
+    "transmission_error": ("length", "um"),
+    "force": ("force", "N"),
+    "speed": ("speed", "rpm"),
+}
+"""Quantity of the unit of each measured quantity, and units that a message states as examples."""
 UNITS: Final = {text: Unit(quantity, size) for quantity, sizes in _BY_QUANTITY.items() for text, size in sizes.items()}
 """Units by their text without blanks, brackets and signs of multiplication and power."""
 _UNIT_IN_ANY_CASE: Final = {text.lower(): unit for text, unit in UNITS.items()}

@@ -286,4 +286,5 @@ def common_rate(path: Path, names: Sequence[str], rates: Sequence[float]) -> flo
 
 def floats(values: NDArray[np.generic]) -> Floats:
     """Values of any number type and byte order in double precision."""
-    return np.ascontiguousarray(values, dtype=np.float64)
+    with np.errstate(invalid="ignore"):  # a signalling NaN of a damaged file; it is found as a value that is no number
+        return np.ascontiguousarray(values, dtype=np.float64)

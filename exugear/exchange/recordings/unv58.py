@@ -131,6 +131,7 @@ def _names(headers: Sequence[_SetHeader]) -> list[str]:
 def _headers(path: Path, file: IO[bytes], size: int) -> Iterator[_SetHeader]:
     """Yield the headers of all time signals; binary values are skipped by their length, never searched for an end."""
     number = 0
+    others: list[str] = []
     while line := file.readline(_LINE):
         if line.strip() != _END:
             continue
@@ -142,6 +143,9 @@ def _headers(path: Path, file: IO[bytes], size: int) -> Iterator[_SetHeader]:
         if number > _MOST_SETS:
             raise RecordingError(f"{path}: has more than {_MOST_SETS} data sets 58; split the file")
         header = _header(path, file, size, number, head)
+        if isinstance(header, str):
+            others.append(header)
+            continue
         yield header
         file.seek(header.begin + _length(header))
         if not header.order:
@@ -156,6 +160,9 @@ def _headers(path: Path, file: IO[bytes], size: int) -> Iterator[_SetHeader]:
         file.seek(tail.index(_END) + 2 - len(tail), os.SEEK_CUR)
         file.readline(_LINE)
 
+    if others and number == len(others):
+        raise RecordingError(f"{path}: contains {others[0]}, but no time signal; export the time signals")
+
 
 def _pass_over(path: Path, file: IO[bytes], kind: str) -> None:
     """Read to the end of a data set of another kind; nothing may follow the last end."""
@@ -166,13 +173,19 @@ def _pass_over(path: Path, file: IO[bytes], kind: str) -> None:
         raise RecordingError(f"{path}: ends inside data set {kind[:20]!r}; the file is truncated, export it again")
 
 
-def _header(path: Path, file: IO[bytes], size: int, number: int, head: bytes) -> _SetHeader:
+def _header(path: Path, file: IO[bytes], size: int, number: int, head: bytes) -> _SetHeader | str:
+    """Read the header of a data set; of one that is no time signal, say what it is, and pass over it."""
     lines = [file.readline(_LINE) for _ in range(11)]
     title = decoded(lines[0]).strip()
     where = f"data set {number}" + (f" ({title})" if title else "")
     if not lines[-1].endswith(b"\n"):
         raise RecordingError(f"{path}: {where}: the file ends in its header; export it again")
-    response = _degree_of_freedom(path, where, lines[5])
+    function, response = _degree_of_freedom(path, where, lines[5])
+    order, stated = _binary(path, where, head)
+    if function not in TIME_RESPONSES:
+        file.seek(min(max(stated, 0), size - file.tell()), os.SEEK_CUR)
+        _pass_over(path, file, "58")
+        return FUNCTIONS.get(function, f"function type {function}")
     record = lines[6]
     try:
         data_type, count, even = (int(record[begin : begin + 10]) for begin in (0, 10, 20))
@@ -191,7 +204,6 @@ def _header(path: Path, file: IO[bytes], size: int, number: int, head: bytes) ->
     if even != 1:
         raise RecordingError(f"{path}: {where}: uneven time steps; export the signal with an even time step")
     check_sizes(path, where, count, 1.0 / step if step else 0.0)
-    order, stated = _binary(path, where, head)
     begin = file.tell()
     line = 0 if order else len(file.readline(_LINE))
     unit = decoded(lines[8][47:67]).strip()
@@ -203,8 +215,8 @@ def _header(path: Path, file: IO[bytes], size: int, number: int, head: bytes) ->
     return found
 
 
-def _degree_of_freedom(path: Path, where: str, line: bytes) -> str:
-    """Response entity, node and direction of record 6; its function type must be that of a time signal."""
+def _degree_of_freedom(path: Path, where: str, line: bytes) -> tuple[int, str]:
+    """Return function type, and response entity, node and direction, of record 6."""
     try:
         kind = int(line[:5])
         entity = decoded(line[31:41]).strip()
@@ -212,11 +224,8 @@ def _degree_of_freedom(path: Path, where: str, line: bytes) -> str:
     except ValueError:
         shown = decoded(line).strip()[:60]
         raise RecordingError(f"{path}: {where}: record 6 is {shown!r}; expected function type and place") from None
-    if kind not in TIME_RESPONSES:
-        named = FUNCTIONS.get(kind, f"function type {kind}")
-        raise RecordingError(f"{path}: {where}: is {named}, not a time signal; export the time signals")
     place = f"{node}:{DIRECTIONS.get(direction, direction)}"
-    return place if entity.upper() in ("", "NONE") else f"{entity} {place}"
+    return kind, place if entity.upper() in ("", "NONE") else f"{entity} {place}"
 
 
 def _binary(path: Path, where: str, head: bytes) -> tuple[str, int]:

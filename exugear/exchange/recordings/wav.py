@@ -82,7 +82,7 @@ def _checked_header(path: Path, file: IO[bytes]) -> tuple[int, float]:
     size = os.fstat(file.fileno()).st_size
     layout: tuple[int, int, float, int] | None = None
     for name, begin, length in _chunks(path, file, size):
-        if name == b"fmt " and length >= 16:
+        if name == b"fmt " and length >= 16 and begin + 16 <= size:
             file.seek(begin)
             kind, channels, rate, _, block, _ = struct.unpack("<HHIIHH", file.read(16))
             if kind not in _FORMATS:

@@ -152,7 +152,7 @@ class _Frames:
         if bins < STEPS:
             raise TooShortError(
                 f"{shaft.revolutions * abs(per):.3g} revolutions are shorter than a window of {window.revolutions:g}; "
-                "choose a shorter window, or record longer"
+                "choose a shorter window, record longer, or check shaft and unit of the speed"
             )
         edges = shaft.angle[0] + step * np.arange(bins + 1)
         return cls(

@@ -57,6 +57,7 @@ def test_the_end_mark_inside_binary_values_is_a_value(tmp_path):
 def test_other_data_sets_are_passed_over_and_names_are_unique(tmp_path, signals):
     other = b"    -1\n    15\n         1         0         0        11  0.0  0.0  0.0\n    -1\n"
     sets = [written.unv_set(y, RATE, node=node, binary="<") for y, node in zip(signals, (4, 5), strict=True)]
+    sets[1:1] = [written.unv_set(signals[0], RATE, "spectrum", kind=12, binary=form) for form in ("<", "")]
     (path := tmp_path / "a.uff").write_bytes(other.join([b"", *sets, b""]))
     assert [channel.name for channel in read_recording(path).channels] == ["HOUSING 4:+Z", "HOUSING 5:+Z"]
 
@@ -76,7 +77,7 @@ def test_units_with_other_signs_are_known(tmp_path, signals, unit):
         ({"count": -5}, "-5 samples"),
         ({"step": 0.0}, "sampling rate 0 Hz"),
         ({"step": float("nan")}, "sampling rate nan Hz"),
-        ({"kind": 4}, "a frequency response function, not a time signal"),
+        ({"kind": 4}, "contains a frequency response function, but no time signal"),
         ({"axis": 18}, "abscissa is quantity 18, not time"),
         ({"type": 5}, "complex values"),
         ({"even": 0}, "uneven time steps"),

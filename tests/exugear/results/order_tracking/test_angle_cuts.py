@@ -9,7 +9,13 @@ import scipy.signal
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.units import RPM
 from exugear.results.order_tracking.angle_cuts import AngleWindow, TooShortError, angle_cuts
-from exugear.results.order_tracking.foreign_orders import foreign_orders, gearbox_orders, standing_orders
+from exugear.results.order_tracking.foreign_orders import (
+    foreign_orders,
+    gearbox_orders,
+    likely_speed,
+    order_spectrum,
+    standing_orders,
+)
 from exugear.results.order_tracking.shaft_angle import ShaftAngle, angle_of_speed, angle_of_tacho
 from exugear.results.spectra.waterfall import OrderLine
 
@@ -109,7 +115,8 @@ def test_orders_of_no_gearbox_are_named_and_a_constant_tone_is_none(grc: Gearbox
     values = sum(a * np.cos(n * shaft.angle + n) for n, a in tones.items()) + 0.5 * rng.standard_normal(time.size)
     values += 0.5 * np.cos(2.0 * np.pi * 740.0 * time)
     known = gearbox_orders(grc, 0.4 * 2.0 * np.pi * RATE / shaft.speed.max())
-    found = foreign_orders(standing_orders(values, shaft, ratio), known, ratio)
+    spectrum = order_spectrum(values, shaft, ratio)
+    found = foreign_orders(standing_orders(spectrum), known, spectrum.resolution)
     assert [own.order / ratio for own in found] == pytest.approx([25.0, 7.4], abs=0.02)
     assert [own.amplitude for own in found] == pytest.approx([0.4, 0.3], rel=0.15)  # between two lines: 1.4 dB
 
@@ -118,4 +125,22 @@ def test_noise_alone_has_no_orders():
     shaft = angle_of_speed(np.linspace(50.0, 300.0, 600_000), RATE)
     for seed in range(3):
         noise = np.random.default_rng(seed).standard_normal(shaft.angle.size)
-        assert standing_orders(noise, shaft) == ()
+        assert standing_orders(order_spectrum(noise, shaft)) == ()
+
+
+CANDIDATES = {"twice": 2.0, "half": 0.5, "four times": 4.0, "output for input": 9.52, "input for output": 1.0 / 9.52}
+"""Mistakes of the speed of a gearbox with the ratio 9.52."""
+
+
+@pytest.mark.parametrize("noise", [0.1, 1.0, 3.0])
+@pytest.mark.parametrize("mistake", [None, *CANDIDATES])
+def test_a_wrong_speed_is_recognised_by_the_mesh_orders(mistake, noise):
+    """Six mesh orders in noise whose power is 20 dB below to 10 dB above theirs, by the true speed; no wrong call."""
+    orders = [22.0, 44.0, 66.0, 6.43, 12.86, 19.29]
+    true = angle_of_speed(np.linspace(50.0, 300.0, 600_000), RATE)
+    rng = np.random.default_rng(4)
+    values = sum(np.cos(n * true.angle + n) for n in orders) / np.sqrt(3.0) + noise * rng.standard_normal(600_000)
+    shaft = true.of_shaft(1.0 if mistake is None else 1.0 / CANDIDATES[mistake])
+    spectrum = order_spectrum(values, shaft)
+    called = None if spectrum is None else likely_speed(spectrum, orders, CANDIDATES)
+    assert called in ({None, mistake} if noise > 1.0 or spectrum is None else {mistake})
