@@ -6,7 +6,7 @@ ones that match the input, and writes only into its folder.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -56,6 +56,7 @@ from exugear.system.tooth_mesh.tables import (
 )
 from exugear.transient.outcome import Run
 from exugear.transient.runup import simulate
+from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.stores import Store
 from fe_ste.transmission_error.table import MeshTable
@@ -68,6 +69,7 @@ if TYPE_CHECKING:
     from exugear.life.static_balance import StaticBalance
     from exugear.report.findings.design_changes import DesignStudy
     from exugear.report.writer import Report
+    from exugear.steady.evaluation.fit import ParameterFit
     from exugear.steady.evaluation.measured_comparison import MeasuredComparison
     from exugear.steady.evaluation.run_up import MeasuredRunUp
 
@@ -361,6 +363,45 @@ class Project(ReprMixin):
             comparison = compare_run_up(loaded.gearbox, found, response, limits)
             comparison.write(path)
         return comparison
+
+    def fit_measured(
+        self, comparison: MeasuredComparison, keys: Sequence[str], method: Method = "parametric"
+    ) -> ParameterFit:
+        """Fit numbers of the gearbox file to a comparison with a measured run-up; nothing is written.
+
+        Parameters
+        ----------
+        comparison : result of `measured`
+        keys : one to three keys of ``housing``, ``damping``, ``bearings``, ``mounts`` or ``couplings``, such as
+            ``housing.factor``
+        method : as in `measured`
+
+        Raises
+        ------
+        GearboxFileError
+            A key has no single number above zero.
+        FitError
+            Too few orders of channels count.
+        """
+        from exugear.steady.evaluation.fit import fit_levels
+        from exugear.steady.evaluation.fitted_response import response_levels, start_of_fit
+        from exugear.steady.evaluation.run_up import response_settings
+
+        cuts = comparison.cuts
+        case = cuts.run_up.section.load_case
+        loaded = self if case is None else self.at_load_case(case)
+        settings = response_settings(loaded.gearbox, cuts.run_up, method)
+        start, limits = start_of_fit(loaded.gearbox, keys)
+        stiffness, bodies = loaded.stiffness(), loaded.bodies()
+
+        def levels(values: Mapping[str, float]) -> Floats:
+            gearbox = loaded.gearbox.varied({key: float(value) for key, value in values.items()})
+            assembly = assemble(gearbox, loaded.choice, stiffness, bodies)
+            return response_levels(assembly, cuts, settings, comparison.harmonics)
+
+        with np.errstate(divide="ignore"):
+            measured = 20.0 * np.log10(np.abs(cuts.measured))
+        return fit_levels(levels, measured, cuts.compared, start, limits)
 
     def measured_path(self, name: str) -> Path:
         """Return the path of the comparison with a measured run-up: next to the modes."""

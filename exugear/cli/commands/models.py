@@ -186,6 +186,14 @@ def measured(
         Literal["linear", "parametric", "nonlinear"],
         typer.Option(metavar="NAME", help="Method of the response: linear, parametric, nonlinear."),
     ] = "parametric",
+    fit: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KEYS",
+            help="Fit one to three numbers of the file, such as housing.factor,damping.modal_percent.",
+            show_default=False,
+        ),
+    ] = None,
     out: options.OutOption = None,
     allow_dir: options.FilesBelowOption = None,
     scripts: options.ScriptsOption = False,
@@ -201,7 +209,7 @@ def measured(
     from exugear.cli.tasks import measured as task
 
     project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias)
-    task.measured(project, name, method, as_json, whole)
+    task.measured(project, name, method, fit, as_json, whole)
 
 
 def run(

@@ -13,15 +13,24 @@ from exugear.cli.tables import Column, Outcome, Table, detail, significant
 from exugear.cli.watched import WatchedProject
 from exugear.results.findings import Finding
 from exugear.results.order_tracking.angle_cuts import TooShortError
+from exugear.steady.evaluation.fit import FitError, ParameterFit
+from exugear.steady.evaluation.fitted_response import start_of_fit
 from exugear.steady.evaluation.measured_comparison import DRAWN_UNITS, MeasuredComparison
 from exugear.steady.evaluation.run_up import read_run_up, response_settings
 from exugear.steady.settings import Method, check_law
 
 
-def measured(project: WatchedProject, name: str | None, method: Method, as_json: bool, whole: bool) -> None:
-    """Compare, store and print a measured run-up of a project."""
+def measured(
+    project: WatchedProject, name: str | None, method: Method, fitted: str | None, as_json: bool, whole: bool
+) -> None:
+    """Compare, store and print a measured run-up of a project; fit some keys (comma-separated) to it."""
     check_law(project.choice.mesh_model, method)
     run_up = read_run_up(project.gearbox, name)
+    keys = [key.strip() for key in fitted.split(",")] if fitted is not None else []
+    if keys:
+        if method == "nonlinear":
+            raise BadInputError("--fit with --method nonlinear: each value takes minutes; use --method parametric")
+        start_of_fit(project.gearbox, keys)
     at_load = project if run_up.section.load_case is None else project.at_load_case(run_up.section.load_case)
     response_settings(at_load.gearbox, run_up, method)
     with suppress(FailedError):  # such a failure does not apply to the selected mesh model
@@ -32,16 +41,22 @@ def measured(project: WatchedProject, name: str | None, method: Method, as_json:
     at_load.prepare()
     try:
         comparison = project.measured(run_up, method)
+        fit = fitted_parameters(project.fit_measured(comparison, keys, method)) if keys else None
     except TooShortError as error:
         raise BadInputError(f"measurements.{run_up.name}.window_revolutions: {error}") from error
+    except FitError as error:
+        raise FailedError(f"fit: {error}") from error
     path = at_load.measured_path(run_up.name)
     summary = {"case": project.gearbox.source, "variant": str(project.choice.variant), **comparison.summary()}
     Outcome(
         verdict=_verdict(summary, comparison),
-        further=[_foreign(summary)] if summary["foreign_orders"] else [],
-        summary={**summary, "file": str(path)},
+        further=[
+            *([_foreign(summary)] if summary["foreign_orders"] else []),
+            *(_fit_line(own) for own in (fit or {"parameters": []})["parameters"]),
+        ],
+        summary={**summary, **({"fit": fit} if fit else {}), "file": str(path)},
         tables=measured_tables(summary),
-        findings=[*comparison.findings, *_unnoticed()],
+        findings=[*comparison.findings, *_undetermined(fit), *_unnoticed()],
         path=f"{path}, CSV tables, {path.with_suffix('.png').name}",
     ).show(as_json, whole)
 
@@ -64,6 +79,43 @@ def _foreign(summary: Mapping[str, Any]) -> str:
     """Return the orders that belong to nothing of the gearbox, in one line."""
     orders = ", ".join(f"{own['order']:.4g}" for own in summary["foreign_orders"][:5])
     return f"Orders of no shaft or mesh: {orders}"
+
+
+def fitted_parameters(fit: ParameterFit) -> dict[str, Any]:
+    """Summarise a fit."""
+    return {
+        "deviation_before_dB": fit.before,
+        "deviation_dB": fit.after,
+        "orders_of_channels": fit.series,
+        "evaluations": fit.evaluations,
+        "correlation": fit.correlation.tolist(),
+        "parameters": [
+            {"key": own.key, "start": own.start, "value": own.value, "interval_95_percent": [own.low, own.high],
+             "refusal": own.refusal}
+            for own in fit.parameters
+        ],
+    }  # fmt: skip
+
+
+def _fit_line(own: Mapping[str, Any]) -> str:
+    """Return a fitted parameter in one line."""
+    low, high = own["interval_95_percent"]
+    if own["refusal"]:
+        return f"Fit: {own['key']} is not determined ({own['refusal']})"
+    return f"Fit: {own['key']} = {own['value']:.4g} ({low:.4g} to {high:.4g}, 95 %), {own['start']:.4g} in the file"
+
+
+def _undetermined(fit: Mapping[str, Any] | None) -> list[Finding]:
+    """Return what a fit says, and what it assumes."""
+    if fit is None:
+        return []
+    before, after, count = fit["deviation_before_dB"], fit["deviation_dB"], fit["orders_of_channels"]
+    text = f"fit: {before:.2f} to {after:.2f} dB (rms) without the mean of each channel, {count} orders of channels"
+    return [
+        Finding(
+            "note", f"{text}; all other values are those of the file, such as inertias: errors of them shift the fit"
+        )
+    ]
 
 
 def _unnoticed() -> list[Finding]:

@@ -191,10 +191,15 @@ OffsetUm = Annotated[float, _symmetric_range(5000.0, 1000.0)]
 
 def unusual_values(model: BaseModel) -> Iterator[tuple[str, float, str]]:
     """Yield key, value and warning of each unusual value of a model."""
-    for key, value, limits in _quantities(model, type(model), (), ""):
+    for key, value, limits in quantities(model):
         warning = limits.warning(value)
         if warning:
             yield key, value, warning
+
+
+def quantities(model: BaseModel) -> Iterator[tuple[str, float, Range]]:
+    """Yield key, value and range of each number of a model that has a range."""
+    yield from _quantities(model, type(model), (), "")
 
 
 def _quantities(value: Any, kind: Any, metadata: tuple[Any, ...], key: str) -> Iterator[tuple[str, float, Range]]:

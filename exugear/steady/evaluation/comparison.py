@@ -22,7 +22,7 @@ from exugear.steady.evaluation.swept import swept_cut
 from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.peaks import line_name
 from exugear.steady.steady_file import complex_amplitudes
-from fe_ste.tools.arrays import Booleans, Complexes, Floats, SingleComplexes
+from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers, SingleComplexes
 from fe_ste.tools.display import ReprMixin
 
 if TYPE_CHECKING:
@@ -178,7 +178,8 @@ def compared_cuts(run_up: MeasuredRunUp, response: xr.Dataset, limits: SingleCom
     frames = cuts[0][0]
     places = np.array([*rows.values()])
     amplitudes = [complex_amplitudes(response)[:, places], *(() if limits is None else limits[:, :, places])]
-    speed, *transfers = _transfers(run_up, response, lines, amplitudes)
+    names = [str(name) for name in response["signal"].to_numpy()]
+    speed, *transfers = transfers_of(run_up, names, response["speed"].to_numpy(), lines, amplitudes)
     swept = np.full((len(transfers), *found[:, : len(lines)].shape), np.nan, dtype=np.complex128)
     for number, transfer in enumerate(transfers):
         for place, line in enumerate(lines):
@@ -206,15 +207,30 @@ def compared_cuts(run_up: MeasuredRunUp, response: xr.Dataset, limits: SingleCom
     )
 
 
-def _transfers(
-    run_up: MeasuredRunUp, response: xr.Dataset, lines: Sequence[OrderLine], amplitudes: Sequence[SingleComplexes]
+def transfers_of(
+    run_up: MeasuredRunUp,
+    names: Sequence[str],
+    signed: Floats,
+    lines: Sequence[OrderLine],
+    amplitudes: Sequence[SingleComplexes],
 ) -> list[Any]:
     """Ascending speeds (points,), rad/s without sign, and of each response what the channels measure at them.
 
-    The latter are (channels, lines, points); their phases are relative to the angle in the sense of rotation.
+    Parameters
+    ----------
+    names : of the signals
+    signed : (points,) speeds of the input, rad/s
+    amplitudes : of each response (points, lines, signals)
+
+    Returns
+    -------
+    speeds, and transfers (channels, lines, points); their phases are relative to the angle in the sense of rotation
+
+    Raises
+    ------
+    SteadyError
+        There is no signal at the place of a channel.
     """
-    names = [str(name) for name in response["signal"].to_numpy()]
-    signed = response["speed"].to_numpy()
     # Speeds without a steady state are interpolated: a single missing value would spread over the whole sweep.
     solved = np.flatnonzero(np.isfinite(np.sum(amplitudes, axis=(0, 2, 3))))
     speed, places = np.unique(np.abs(signed[solved]), return_index=True)
@@ -233,11 +249,21 @@ def _transfers(
 
 def mesh_lines(response: xr.Dataset, harmonics: int) -> dict[str, int]:
     """Places of the mesh frequencies and their harmonics among the orders of a steady-state response, by name."""
-    bases = tuple(str(name) for name in response["base"].to_numpy())
+    return harmonic_rows(response["index"].to_numpy(), [str(name) for name in response["base"].to_numpy()], harmonics)
+
+
+def harmonic_rows(indices: Integers, bases: Sequence[str], harmonics: int) -> dict[str, int]:
+    """Rows with multiples of a single mesh frequency among multiples (lines, bases) of all of them, by name.
+
+    Examples
+    --------
+    >>> harmonic_rows(np.array([[0, 0], [1, 0], [1, -1], [0, 2], [0, 3]]), ["one", "two"], 2)
+    {'one': 1, '2 x two': 3}
+    """
     found = {}
-    for row, index in enumerate(response["index"].to_numpy()):
+    for row, index in enumerate(indices):
         if np.count_nonzero(index) == 1 and 1 <= index[index != 0][0] <= harmonics:
-            name = line_name(tuple(int(n) for n in index), bases)
+            name = line_name(tuple(int(n) for n in index), tuple(bases))
             if "carrier" not in name.split():
                 found[name] = row
     return found

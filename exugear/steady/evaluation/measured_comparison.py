@@ -77,6 +77,8 @@ class MeasuredComparison(ReprMixin):
     foreign: tuple[OrderInSpectrum, ...]
     """Orders that carry power and belong to no shaft or mesh of the gearbox."""
     findings: tuple[Finding, ...]
+    harmonics: int
+    """Harmonics of each mesh frequency in the response."""
     input_hash: str
     """SHA-256 of the recording, the section of the gearbox file and the input of the response."""
 
@@ -323,6 +325,7 @@ def compare_run_up(
         peaks=peaks,
         foreign=foreign,
         findings=tuple(finding for part in found for finding in part),
+        harmonics=int(response.attrs["harmonics"]),
         input_hash=hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest(),
     )
 

@@ -280,6 +280,47 @@ def test_the_command_prints_peaks_and_writes_its_files(bench: Bench, tmp_path: P
         assert limits[1][at] < np.abs(found.cuts.computed[at]) < limits[0][at]
 
 
+@pytest.mark.validation
+def test_a_fit_finds_housing_stiffness_and_damping_of_another_gearbox(tmp_path: Path) -> None:
+    """Signals of a gearbox with 0.62 and 1.5 % instead of 0.5 and 2 %, gains off by 1 dB: both within intervals."""
+    _, speed, angle = synthetic.run_up()
+    changes = {"housing.factor": 0.62, "damping.modal_percent": 1.5}
+    own = synthetic.signals(
+        synthetic.response(Gearbox.from_dict(synthetic.content()).varied(changes)), speed, angle, 0.05
+    )
+    gains = {"left": 1.12, "right": 0.9, "te": 1.05}
+    synthetic.recorded(tmp_path / "bench.h5", {name: gains[name] * values for name, values in own.items()}, angle)
+    path = synthetic.gearbox_file(tmp_path, synthetic.measurement())
+    outcome = exugear("measured", path, "--out", tmp_path / "r", "--fit", ",".join(changes), "--json")
+    assert outcome.exit_code == 0, outcome.stderr
+    fit = json.loads(outcome.stdout)["fit"]
+    for found, (key, true) in zip(fit["parameters"], changes.items(), strict=True):
+        assert (found["key"], found["refusal"]) == (key, "")
+        assert found["interval_95_percent"][0] <= true <= found["interval_95_percent"][1], found
+        assert found["value"] == pytest.approx(true, rel=0.02)
+    assert fit["deviation_dB"] < 0.1 < fit["deviation_before_dB"]
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        (
+            "housing.factr",
+            "fit of housing.factr: the file has no such number above zero; did you mean 'housing.factor'",
+        ),
+        ("gears.pinion_1.teeth", r"no such number above zero; single numbers of \[bearings\], \[couplings\], "),
+        ("housing.factor,housing.factor", "one to 3 different keys can be fitted"),
+        ("a,b,c,d", "one to 3 different keys can be fitted"),
+    ],
+)
+def test_a_key_that_cannot_be_fitted_ends_with_code_2(short: Path, keys: str, message: str) -> None:
+    path = synthetic.gearbox_file(short.parent, synthetic.measurement())
+    outcome = exugear("measured", path, "--out", short.parent / "results", "--fit", keys)
+    assert outcome.exit_code == 2
+    assert re.search(message, outcome.stderr), outcome.stderr
+    assert not (short.parent / "results").exists()
+
+
 @pytest.mark.parametrize("damage", ["truncated", "no name", "two measurements"])
 def test_a_bad_recording_or_name_ends_with_code_2_and_writes_nothing(short: Path, damage: str) -> None:
     folder = short.parent
