@@ -6,7 +6,7 @@ ones that match the input, and writes only into its folder.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -31,7 +31,7 @@ from exugear.results.folder import (
 )
 from exugear.results.run_file import FINAL_NAME
 from exugear.results.solver_comparison import EXUDYN_FOLDER, SolverComparison, compare_solvers
-from exugear.steady.settings import SteadySettings, usual_speeds
+from exugear.steady.settings import Method, SteadySettings, usual_speeds
 from exugear.system.bearings.duty import BearingLoadState
 from exugear.system.bearings.rolling.rows import BearingError
 from exugear.system.bodies.elastic_body import ElasticBody
@@ -56,6 +56,7 @@ from exugear.system.tooth_mesh.tables import (
 )
 from exugear.transient.outcome import Run
 from exugear.transient.runup import simulate
+from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.stores import Store
 from fe_ste.transmission_error.table import MeshTable
@@ -68,6 +69,9 @@ if TYPE_CHECKING:
     from exugear.life.static_balance import StaticBalance
     from exugear.report.findings.design_changes import DesignStudy
     from exugear.report.writer import Report
+    from exugear.steady.evaluation.fit import ParameterFit
+    from exugear.steady.evaluation.measured_comparison import MeasuredComparison
+    from exugear.steady.evaluation.run_up import MeasuredRunUp
 
 Figures = dict[tuple[str, str, str], dict[str, float]]
 """Values of flanks by gear, family of meshes and flank, and then by symbol."""
@@ -316,6 +320,92 @@ class Project(ReprMixin):
         self.keep_case()
         with time_noted(self.folder, f"steady, {choice.variant}, {choice.inertias}, {choice.mesh_model}"):
             return stored_or_computed(self.steady_path(settings), assembly, settings, progress)
+
+    def measured(
+        self,
+        run_up: MeasuredRunUp | str | None = None,
+        method: Method = "parametric",
+        progress: Callable[[int, int], None] | None = None,
+    ) -> MeasuredComparison:
+        """Compare a measured run-up of the gearbox file with the steady-state response over its speeds.
+
+        The response is stored next to the modes and reused if it matches. The comparison is written to
+        `measured_path`, with tables and a diagram.
+
+        Parameters
+        ----------
+        run_up : name of a table of ``[measurements]``, or one read by
+            `exugear.steady.evaluation.run_up.read_run_up`; not needed if there is only one
+        method : of the response, as in `exugear.steady.settings.SteadySettings`
+        progress : called with the number of finished speeds and the total
+
+        Raises
+        ------
+        GearboxFileError
+            There is no such measurement, or its recording cannot be used.
+        SteadyError
+            The response has no signal at the place of a channel.
+        """
+        from exugear.steady.evaluation.damping import damping_extremes
+        from exugear.steady.evaluation.measured_comparison import compare_run_up
+        from exugear.steady.evaluation.run_up import MeasuredRunUp, read_run_up, response_settings
+        from exugear.steady.steady_file import stored_or_computed
+
+        found = run_up if isinstance(run_up, MeasuredRunUp) else read_run_up(self.gearbox, run_up)
+        loaded = self if found.section.load_case is None else self.at_load_case(found.section.load_case)
+        settings = response_settings(loaded.gearbox, found, method)
+        assembly = loaded.assembly()
+        path = loaded.measured_path(found.name)
+        loaded.keep_case()
+        with time_noted(loaded.folder, f"measured {found.name}, {self.choice.variant}, {self.choice.mesh_model}"):
+            response = stored_or_computed(path.with_name(f"{path.stem}-steady.nc"), assembly, settings, progress)
+            limits = damping_extremes(assembly, response, settings)
+            comparison = compare_run_up(loaded.gearbox, found, response, limits)
+            comparison.write(path)
+        return comparison
+
+    def fit_measured(
+        self, comparison: MeasuredComparison, keys: Sequence[str], method: Method = "parametric"
+    ) -> ParameterFit:
+        """Fit numbers of the gearbox file to a comparison with a measured run-up; nothing is written.
+
+        Parameters
+        ----------
+        comparison : result of `measured`
+        keys : one to three keys of ``housing``, ``damping``, ``bearings``, ``mounts`` or ``couplings``, such as
+            ``housing.factor``
+        method : as in `measured`
+
+        Raises
+        ------
+        GearboxFileError
+            A key has no single number above zero.
+        FitError
+            Too few orders of channels count.
+        """
+        from exugear.steady.evaluation.fit import fit_levels
+        from exugear.steady.evaluation.fitted_response import response_levels, start_of_fit
+        from exugear.steady.evaluation.run_up import response_settings
+
+        cuts = comparison.cuts
+        case = cuts.run_up.section.load_case
+        loaded = self if case is None else self.at_load_case(case)
+        settings = response_settings(loaded.gearbox, cuts.run_up, method)
+        start, limits = start_of_fit(loaded.gearbox, keys)
+        stiffness, bodies = loaded.stiffness(), loaded.bodies()
+
+        def levels(values: Mapping[str, float]) -> Floats:
+            gearbox = loaded.gearbox.varied({key: float(value) for key, value in values.items()})
+            assembly = assemble(gearbox, loaded.choice, stiffness, bodies)
+            return response_levels(assembly, cuts, settings, comparison.harmonics)
+
+        with np.errstate(divide="ignore"):
+            measured = 20.0 * np.log10(np.abs(cuts.measured))
+        return fit_levels(levels, measured, cuts.compared, start, limits)
+
+    def measured_path(self, name: str) -> Path:
+        """Return the path of the comparison with a measured run-up: next to the modes."""
+        return self.modes_path.with_name(f"measured-{name}.nc")
 
     def steady_path(self, settings: SteadySettings) -> Path:
         """Return the path of the steady-state response."""

@@ -34,6 +34,7 @@ LONG = (
     "flanks_and_deviations",
     "flexible_bodies",
     "lubricant",
+    "measured_run_up",
     "operating_range",
     "reference_analysis",
     "resume_a_run",

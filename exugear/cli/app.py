@@ -29,6 +29,7 @@ COMMANDS = (
     "models.bearings",
     "models.modes",
     "models.steady",
+    "models.measured",
     "models.run",
     "models.study",
     "models.loads",

@@ -13,7 +13,7 @@ from exugear.gearbox.reading import GearboxFileError
 from exugear.project import Project
 from exugear.results.folder import time_noted
 from exugear.results.solver_comparison import SolverComparison
-from exugear.steady.settings import SteadySettings
+from exugear.steady.settings import Method, SteadySettings
 from exugear.system.bearings.duty import BearingLoadState
 from exugear.system.bearings.stiffness import elastic_names
 from exugear.system.bodies.elastic_body import ElasticBody
@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 
     from exugear.life.load_spectrum.counted import CountedLoads
     from exugear.life.rating.sheet import RatingSheet
+    from exugear.steady.evaluation.fit import ParameterFit
+    from exugear.steady.evaluation.measured_comparison import MeasuredComparison
+    from exugear.steady.evaluation.run_up import MeasuredRunUp
 
 
 @dataclass(frozen=True, repr=False)
@@ -109,6 +112,26 @@ class WatchedProject(Project):
         with self.bars.row() as row:
             row(words)
             return super().steady(settings, lambda done, total: row(words, done, total))
+
+    def measured(
+        self,
+        run_up: MeasuredRunUp | str | None = None,
+        method: Method = "parametric",
+        progress: Callable[[int, int], None] | None = None,
+    ) -> MeasuredComparison:
+        """Comparison with a measured run-up."""
+        words = f"{self.choice.variant}: steady state over the measured speeds"
+        with self.bars.row() as row:
+            row(words)
+            return super().measured(run_up, method, lambda done, total: row(words, done, total))
+
+    def fit_measured(
+        self, comparison: MeasuredComparison, keys: Sequence[str], method: Method = "parametric"
+    ) -> ParameterFit:
+        """Fit of keys to a measured run-up."""
+        with self.bars.row() as row:
+            row(f"fit of {', '.join(keys)}")
+            return super().fit_measured(comparison, keys, method)
 
     def run(self, **options: Any) -> Run:
         """Run of the load case in time."""

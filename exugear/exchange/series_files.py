@@ -11,7 +11,6 @@ times (int32); then the values step by step. Packed numbers are ``value * scale 
 from __future__ import annotations
 
 import csv
-import hashlib
 import os
 import struct
 from collections.abc import Collection, Iterator, Sequence
@@ -405,7 +404,6 @@ def _blocks(path: Path, layout: _ValueLayout, places: tuple[int, ...]) -> Iterat
 
 LARGEST_SERIES = 2_000_000_000
 """Maximum size of a file, bytes."""
-_BLOCK = 1_000_000
 SERIES_ENDINGS = (".outb", ".out", ".csv")
 
 
@@ -435,21 +433,3 @@ def read_channels(path: str | Path) -> Channels:
     if ending not in SERIES_ENDINGS:
         raise LoadFileError(f"{path}: ends in {ending or 'nothing'}; load files end in {', '.join(SERIES_ENDINGS)}")
     return _OPENED[ending](path)
-
-
-def file_digest(path: Path) -> str:
-    """SHA-256 of a file.
-
-    Raises
-    ------
-    LoadFileError
-        The file cannot be read.
-    """
-    try:
-        with open_regular(path) as file:
-            digest = hashlib.sha256()
-            while block := file.read(_BLOCK):
-                digest.update(block)
-            return digest.hexdigest()
-    except FileError as error:
-        raise LoadFileError(str(error)) from None

@@ -20,6 +20,7 @@ from exugear.gearbox.sections.case import GearboxFile
 from exugear.gearbox.sections.connections import BearingSection, ConnectorDampingSection, StiffnessSection
 from exugear.gearbox.sections.entries import GROUND
 from exugear.gearbox.train import Train
+from exugear.gearbox.units import MEASURED_UNITS, unit_of
 from fe_ste.geometry.gears import Gear
 
 CENTRE_DISTANCE_TOLERANCE = 2e-5
@@ -392,6 +393,33 @@ def errors_of_seals(case: GearboxFile, named_bodies: Collection[str]) -> Iterato
             yield f"seals.{name}.on = {seal.on!r}: is the body that the seal slides on; set another body, or remove on"
 
 
+def errors_of_measurements(case: GearboxFile, named_bodies: Mapping[str, Body]) -> Iterator[str]:
+    """Yield an error for each measurement at a shaft or place, or with a load case, that is not in the file."""
+    turning = {name: body for name, body in named_bodies.items() if not body.fixed}
+    places = {**case.bearings, **case.mounts}
+    for name, measurement in case.measurements.items():
+        key = f"measurements.{name}"
+        for kind, source in (("tacho", measurement.tacho), ("speed", measurement.speed)):
+            if source is not None and source.shaft not in turning:
+                known = known_names("shafts", turning, "bodies.NAME")
+                yield f"{key}.{kind}.shaft = {source.shaft!r}: no such shaft; {known}"
+        if measurement.load_case is not None and measurement.load_case not in case.load_cases:
+            known = known_names("load cases", case.load_cases, "load_cases.NAME")
+            yield f"{key}.load_case = {measurement.load_case!r}: no such load case; {known}"
+        units = [("speed", "speed", measurement.speed.unit)] if measurement.speed is not None else []
+        units += [(f"channels.{own}", section.quantity, section.unit) for own, section in measurement.channels.items()]
+        for place, quantity, text in units:
+            unit = None if text is None else unit_of(text, any_case=True)
+            kind, examples = MEASURED_UNITS[quantity]
+            if text is not None and (unit is None or unit.quantity != kind):
+                what = "unknown" if unit is None else f"a unit of {unit.quantity}"
+                yield f"{key}.{place}.unit = {text!r}: {what}; set a unit of {quantity}, such as {examples}"
+        for channel, section in measurement.channels.items():
+            if section.place is not None and section.place not in places:
+                known = known_names("bearings and mounts", places, "bearings.NAME")
+                yield f"{key}.channels.{channel}.place = {section.place!r}: no such place; {known}"
+
+
 def errors_of_names(elements: Mapping[str, Sequence[Element]]) -> Iterator[str]:
     """Yield an error for a name used twice among meshes, supports and couplings, since results list them together."""
     tables: dict[str, str] = {}
@@ -483,6 +511,7 @@ CHECKS = (
     Check("connection", errors_of_connection, ("ends", "meshes", "couplings", "mounts")),
     Check("torsion", errors_of_torsion, ("couplings", "supports")),
     Check("seals", errors_of_seals, ("ends",)),
+    Check("measurements", errors_of_measurements, ("ends",)),
     Check("names", errors_of_names, ("meshes", "bearings", "mounts", "couplings", "forces")),
     Check("axes", errors_of_joints, ("joints",)),
     Check("repetition", errors_of_repetition, ("deviations", "pin_offsets")),

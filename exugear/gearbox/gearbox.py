@@ -43,10 +43,20 @@ from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.standards import iso6336
 from fe_ste.tools.display import ReprMixin, TitledRows
 
-BESIDE_EQUATIONS = ("labels", "load_cases", "loads", "lubricant", "operation", "rating", "report", "ste")
+BESIDE_EQUATIONS = (
+    "labels",
+    "load_cases",
+    "loads",
+    "lubricant",
+    "measurements",
+    "operation",
+    "rating",
+    "report",
+    "ste",
+)
 """Tables of the file that do not affect the equations of motion: labels, load cases, life loads, lubricant,
-operation, rating, and settings of reports and STE tables. STE settings enter the hashes separately; a run adds its own
-load case.
+measurements, operation, rating, and settings of reports and STE tables. STE settings enter the hashes separately; a
+run adds its own load case.
 """
 
 

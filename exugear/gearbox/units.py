@@ -21,6 +21,8 @@ RPM: Final = math.pi / 30.0
 """One revolution per minute, rad/s."""
 DEG: Final = math.pi / 180.0
 """One degree, rad."""
+STANDARD_GRAVITY: Final = 9.80665
+"""Standard acceleration of gravity, m/s2 (ISO 80000-3); sensors are often calibrated in multiples of it."""
 
 
 class Unit(NamedTuple):
@@ -45,8 +47,9 @@ _BY_QUANTITY: Final[dict[str, dict[str, float]]] = {
         "1/min": RPM,
         "Hz": 2.0 * math.pi,
     },
-    "velocity": {"m/s": 1.0, "m/sec": 1.0, "km/h": 1.0 / 3.6},
-    "acceleration": {"m/s2": 1.0},
+    "velocity": {"m/s": 1.0, "m/sec": 1.0, "mm/s": MM, "km/h": 1.0 / 3.6},
+    "acceleration": {"m/s2": 1.0, "m/s/s": 1.0, "mm/s2": MM, "g": STANDARD_GRAVITY},
+    "voltage": {"V": 1.0, "mV": 1e-3},
     "time": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0, "hr": 3600.0, "hours": 3600.0},
     "duration": {"years": 365.25 * 86400.0},
     "force": {"N": 1.0, "kN": KN, "MN": 1e6},
@@ -66,10 +69,19 @@ _BY_QUANTITY: Final[dict[str, dict[str, float]]] = {
     "viscosity": {"mm2/s": 1e-6},
     "temperature": {"C": 1.0},
 }
+MEASURED_UNITS: Final = {
+    "acceleration": ("acceleration", "m/s2 or g"),
+    "velocity": ("velocity", "m/s or mm/s"),
+    "displacement": ("length", "um"),
+    "transmission_error": ("length", "um"),
+    "force": ("force", "N"),
+    "speed": ("speed", "rpm"),
+}
+"""Quantity of the unit of each measured quantity, and units that a message states as examples."""
 UNITS: Final = {text: Unit(quantity, size) for quantity, sizes in _BY_QUANTITY.items() for text, size in sizes.items()}
 """Units by their text without blanks, brackets and signs of multiplication and power."""
 _UNIT_IN_ANY_CASE: Final = {text.lower(): unit for text, unit in UNITS.items()}
-_PLAIN: Final = str.maketrans({"µ": "u", **dict.fromkeys(" ·*-^_()[]", "")})
+_PLAIN: Final = str.maketrans({"µ": "u", "²": "2", **dict.fromkeys(" ·*-^_()[]", "")})
 
 
 def unit_of(text: str, any_case: bool = False) -> Unit | None:

@@ -17,5 +17,7 @@ RUN = 11
 LIFE = 10
 #: Steady-state responses (`exugear.steady`, and all methods that modes use).
 STEADY = 16
+#: Comparisons with measured run-ups (`exugear.steady.evaluation`, `exugear.results.order_tracking`).
+MEASURED = 1
 #: Points of studies (`exugear.studies`: their outputs; the methods that these use have their own versions).
 STUDY = 4

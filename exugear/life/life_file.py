@@ -19,14 +19,13 @@ from exugear.life.bearing_life import BearingLife
 from exugear.life.dynamic_factors import source_hash
 from exugear.life.gear_life import FlankLife
 from exugear.life.life import Life, checked_loads, life_hash, rating_of
-from exugear.life.load_spectrum.counted import write_table
 from exugear.life.static_balance import life_requests
 from exugear.results.folder import modes_path
 from exugear.system.statics import BalanceError
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.drawing import COLOURS, WARNING_COLOUR, drawing_style, finish_figure, new_figure
-from fe_ste.tools.files import FileError
+from fe_ste.tools.files import FileError, write_table
 from fe_ste.tools.stores import Layout, Store, load_dataset, write_dataset
 
 if TYPE_CHECKING:

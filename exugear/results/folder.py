@@ -168,7 +168,7 @@ STUDIES, DATASET, PICTURES = "studies", "study.nc", "pictures"
 STUDY_LAYOUT = Layout(
     "study", STUDY, {}, ("title", "study", "case", "case_digest", "input_hash", "points", "failed", "missing")
 )
-WORDS = ("labels", "report")
+WORDS = ("labels", "measurements", "report")
 """Tables of a gearbox file that no output of a study depends on."""
 OF_LIFE = ("loads", "operation", "rating")
 """Tables on which only outputs on life depend."""

@@ -40,7 +40,7 @@ from exugear.steady.settings import SteadySettings, check_deviations, check_law,
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers, SingleComplexes, Texts
 from fe_ste.tools.display import ReprMixin, TitledRows, value_range
-from fe_ste.tools.threads import one_dense_thread, side_by_side
+from fe_ste.tools.threads import one_dense_thread
 
 LONGEST = 0.4
 """Longest step along a branch: in tenths of the static deflections, and in hundredths of the speed."""
@@ -274,8 +274,6 @@ LONGEST_WARNING = 300
 """Letters of a remark."""
 RESOLVED = 1e-4
 """Share of the exchanged power below which dissipated power is round-off."""
-AT_ONCE = 8
-"""Points that two threads solve before progress is shown."""
 Kept = Callable[[SolvedPoints], None]
 
 
@@ -423,13 +421,10 @@ def _solve_from(
             getattr(points, field.name)[first:count] = getattr(known, field.name)[first:count]
     kept = time.monotonic()
     done = count
-    # States of the method `nonlinear` start from the one before.
-    at_once = 1 if solver().method == "nonlinear" else AT_ONCE
     try:
-        while done < len(points.speed):
-            block = range(done, min(done + at_once, len(points.speed)))
-            side_by_side(lambda n: _solve_one(points, n, solver()), block)
-            done = block.stop
+        for n in range(count, len(points.speed)):
+            _solve_one(points, n, solver())
+            done = n + 1
             progress(done, len(points.speed))
             if keep is not None and time.monotonic() - kept > keep_every:
                 keep(points.part(slice(done)))

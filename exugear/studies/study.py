@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from exugear.exchange.series_files import file_digest
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import NOTHING_MORE, Permissions
@@ -63,6 +62,7 @@ from exugear.system.statics import BalanceError
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from fe_ste.tools.display import ReprMixin
+from fe_ste.tools.files import file_digest
 from fe_ste.tools.versions import TABLE
 
 OF_POINTS = ("error", "doubts", "seconds", "memory")

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import io
 import os
 import secrets
 import stat
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
@@ -105,6 +106,14 @@ def write_file(path: Path, content: ReadableBuffer) -> None:
         write_all(file, content)
 
 
+def write_table(path: Path, headings: Sequence[str], rows: Iterable[Sequence[float | str]]) -> Path:
+    """Write a CSV table as an atomic operation, with numbers to nine digits."""
+    lines = [",".join(headings)]
+    lines += [",".join(cell if isinstance(cell, str) else f"{cell:.9g}" for cell in row) for row in rows]
+    write_file(path, ("\n".join(lines) + "\n").encode())
+    return path
+
+
 def append_line(path: Path, line: str) -> None:
     """Add a line to a text file; several processes may do so at once. A line cut short before it stays alone."""
     flags = os.O_RDWR | os.O_APPEND | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
@@ -153,6 +162,21 @@ def read_text(path: Path, limit: int = _TEXT_LIMIT) -> str:
     if len(content) > limit:
         raise FileError(f"{path}: is larger than {limit / 1e6:g} MB")
     return content.decode("utf-8", errors="replace")
+
+
+def file_digest(path: Path) -> str:
+    """Compute the SHA-256 of a file, whatever its size.
+
+    Raises
+    ------
+    FileError
+        It is missing or cannot be read.
+    """
+    digest = hashlib.sha256()
+    with open_regular(path) as file:
+        while block := file.read(1_000_000):
+            digest.update(block)
+    return digest.hexdigest()
 
 
 @contextmanager

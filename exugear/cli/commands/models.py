@@ -171,6 +171,47 @@ def steady(
     task.steady(project, settings, quantity, as_json, whole)
 
 
+def measured(
+    case: options.CaseArgument,
+    name: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="NAME", help="Table of [measurements]; not needed if there is only one.", show_default=False
+        ),
+    ] = None,
+    variant: options.VariantOption = None,
+    mesh_model: options.LawOption = options.USUAL_LAW,
+    inertias: options.InertiasOption = None,
+    method: Annotated[
+        Literal["linear", "parametric", "nonlinear"],
+        typer.Option(metavar="NAME", help="Method of the response: linear, parametric, nonlinear."),
+    ] = "parametric",
+    fit: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KEYS",
+            help="Fit one to three numbers of the file, such as housing.factor,damping.modal_percent.",
+            show_default=False,
+        ),
+    ] = None,
+    out: options.OutOption = None,
+    allow_dir: options.FilesBelowOption = None,
+    scripts: options.ScriptsOption = False,
+    whole: options.AllOption = False,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Compare a measured run-up with the steady-state response.
+
+    Cuts the mesh orders out of a recording of section [measurements], sweeps and averages the computed ones in the same
+    way, and lists peaks with their differences, and orders that belong to no part of the gearbox.
+    """
+    from exugear.cli.case import open_project
+    from exugear.cli.tasks import measured as task
+
+    project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias)
+    task.measured(project, name, method, fit, as_json, whole)
+
+
 def run(
     context: typer.Context,
     case: options.CaseArgument,

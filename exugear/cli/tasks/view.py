@@ -29,7 +29,7 @@ from exugear.report.pictures.shapes import bodies_of, mode_scene, motions_of
 from exugear.report.web.mode_page import ModeRow, ResonanceRow, write_mode_page
 from exugear.report.writer import command_line
 from exugear.results.findings import Finding
-from exugear.steady.deflection_shapes import deflection_shapes
+from exugear.steady.evaluation.deflection_shapes import deflection_shapes
 from exugear.steady.steady_file import load_response, settings_of
 from exugear.system.modes import Modes
 from exugear.system.system import Assembly

@@ -33,6 +33,7 @@ from exugear.gearbox.sections.entries import (
 )
 from exugear.gearbox.sections.gears import DeviationSection, GearSection, PairSection, PinSection
 from exugear.gearbox.sections.loads import LoadsSection, LubricantSection, RatingSection
+from exugear.gearbox.sections.measurements import MeasurementSection
 
 
 class LoadCaseSection(Section):
@@ -390,6 +391,8 @@ class GearboxFile(Section):
     """Rating of gears and bearings."""
     lubricant: LubricantSection | None = None
     """Oil."""
+    measurements: Entries[MeasurementSection] = {}
+    """Recorded run-ups of a test rig, by name."""
 
     @model_validator(mode="after")
     def _labels_of_entries(self) -> GearboxFile:

@@ -179,6 +179,13 @@ ToleranceClass = Annotated[int, Range(1, 11)]
 NominalHours = Annotated[float, Range(0.01, 1e7, (100.0, 3e5))]
 SafetyFactor = Annotated[float, Range(0.5, 10.0, (1.0, 3.0))]
 
+# Measurements.
+PulsesPerRevolution = Annotated[int, Range(1, 100_000, (1, 10_000))]
+WindowRevolutions = Annotated[float, Range(1.0, 1000.0, (4.0, 64.0), "revolutions of the shaft with the tacho")]
+MeasuredHarmonics = Annotated[int, Range(1, 20)]
+FullScale = Annotated[float, Range(1e-12, 1e12, None, "value of a channel at full scale, in its unit")]
+DirectionComponent = Annotated[float, Range(-1e6, 1e6)]
+
 # Numerical settings.
 FrequencyHz = Annotated[float, Range(1.0, 1e6, (10.0, 1e5))]
 Positions = Annotated[int, Range(8, 2000, (8, 500))]
@@ -188,10 +195,15 @@ OffsetUm = Annotated[float, _symmetric_range(5000.0, 1000.0)]
 
 def unusual_values(model: BaseModel) -> Iterator[tuple[str, float, str]]:
     """Yield key, value and warning of each unusual value of a model."""
-    for key, value, limits in _quantities(model, type(model), (), ""):
+    for key, value, limits in quantities(model):
         warning = limits.warning(value)
         if warning:
             yield key, value, warning
+
+
+def quantities(model: BaseModel) -> Iterator[tuple[str, float, Range]]:
+    """Yield key, value and range of each number of a model that has a range."""
+    yield from _quantities(model, type(model), (), "")
 
 
 def _quantities(value: Any, kind: Any, metadata: tuple[Any, ...], key: str) -> Iterator[tuple[str, float, Range]]:

@@ -7,7 +7,7 @@ faces the sense of +z rotation.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,7 +29,7 @@ from exugear.life.load_spectrum.sources import (
 )
 from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.drawing import COLOURS, drawing_style, finish_figure, new_figure
-from fe_ste.tools.files import write_file
+from fe_ste.tools.files import write_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -326,14 +326,6 @@ def write_spectra(counted: CountedLoads, folder: Path) -> list[Path]:
             path = folder / f"{tooth.gear}_{tooth.family}_{side}.csv"
             paths.append(write_table(path, ("mesh_force_N", "hours", "cycles"), lines))
     return paths
-
-
-def write_table(path: Path, headings: Sequence[str], rows: Iterable[Sequence[float | str]]) -> Path:
-    """Write a CSV table as an atomic operation, with numbers to nine digits."""
-    lines = [",".join(headings)]
-    lines += [",".join(cell if isinstance(cell, str) else f"{cell:.9g}" for cell in row) for row in rows]
-    write_file(path, ("\n".join(lines) + "\n").encode())
-    return path
 
 
 # Diagrams of load duration distributions

@@ -20,7 +20,6 @@ from exugear.exchange.rexs.tree import Model, RexsError, RexsLoadCase
 from exugear.exchange.series_files import (
     LARGEST_SERIES,
     SERIES_ENDINGS,
-    file_digest,
     first_lines,
     headings_of,
     is_series,
@@ -42,6 +41,7 @@ from exugear.life.load_spectrum.series import (
 )
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin
+from fe_ste.tools.files import FileError, file_digest
 
 # Hours of simulated files by wind speed: a Weibull distribution over wind speed bins
 
@@ -340,7 +340,7 @@ class _SourceDraft:
             self._table = self._counted(path)
             if self._table is None:
                 self._take_series(path)
-        except (LoadFileError, RexsError) as error:
+        except (FileError, LoadFileError, RexsError) as error:
             raise self.gearbox.error(f"{self.key}.{'file' if self.section.file else 'files'}: {error}") from error
         if self._table is not None:
             self._check_table(path)

@@ -23,6 +23,7 @@ from exugear.gearbox.sections import (
     entries,
     gears,
     loads,
+    measurements,
 )
 from exugear.gearbox.sections import (
     loads as lubricant,
@@ -44,7 +45,9 @@ from exugear.system.tooth_mesh.tables import wanted_table
 from ..cases import gear_trains
 from ..cases.case_mutations import bases, toml_text
 
-ELSEWHERE = {f"GearboxFile.{table}" for table in ("labels", "operation", "loads", "rating", "lubricant")}
+ELSEWHERE = {
+    f"GearboxFile.{table}" for table in ("labels", "operation", "loads", "rating", "lubricant", "measurements")
+}
 ELSEWHERE |= {"CatalogueSection.fatigue_load_limit_kN", "ReportSection.quantity"}
 """Keys of pages and of a life, whose computation takes too long here: another test looks for them in the program."""
 FOR_PEOPLE = {
@@ -66,6 +69,10 @@ LIFE_SECTIONS = (
     loads.StrengthSection,
     case.OperationSection,
     connections.SealSection,
+    measurements.MeasurementSection,
+    measurements.MeasuredChannelSection,
+    measurements.TachoSection,
+    measurements.SpeedChannelSection,
 )
 CASE_MODEL = (entries, gears, bodies, connections, case)
 """Modules of the case model."""

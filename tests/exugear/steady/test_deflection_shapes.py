@@ -10,7 +10,7 @@ import pytest
 from exugear.gearbox.choice import Choice
 from exugear.report.findings.ranking import ranking_of
 from exugear.report.web.stage import drawn_bodies, drawn_mode
-from exugear.steady.deflection_shapes import deflection_shapes
+from exugear.steady.evaluation.deflection_shapes import deflection_shapes
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import steady_response
 from exugear.system.build import assemble

@@ -1,0 +1,196 @@
+"""The command `measured`: a measured run-up next to the steady-state response."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import Any
+
+from exugear.cli.case import assembled_by_iso, check_friction, steady_lack
+from exugear.cli.console import BadInputError, FailedError
+from exugear.cli.tables import Column, Outcome, Table, detail, significant
+from exugear.cli.watched import WatchedProject
+from exugear.results.findings import Finding
+from exugear.results.order_tracking.angle_cuts import TooShortError
+from exugear.steady.evaluation.fit import FitError, ParameterFit
+from exugear.steady.evaluation.fitted_response import start_of_fit
+from exugear.steady.evaluation.measured_comparison import DRAWN_UNITS, MeasuredComparison
+from exugear.steady.evaluation.run_up import read_run_up, response_settings
+from exugear.steady.settings import Method, check_law
+
+
+def measured(
+    project: WatchedProject, name: str | None, method: Method, fitted: str | None, as_json: bool, whole: bool
+) -> None:
+    """Compare, store and print a measured run-up of a project; fit some keys (comma-separated) to it."""
+    check_law(project.choice.mesh_model, method)
+    run_up = read_run_up(project.gearbox, name)
+    keys = [key.strip() for key in fitted.split(",")] if fitted is not None else []
+    if keys:
+        if method == "nonlinear":
+            raise BadInputError("--fit with --method nonlinear: each value takes minutes; use --method parametric")
+        start_of_fit(project.gearbox, keys)
+    at_load = project if run_up.section.load_case is None else project.at_load_case(run_up.section.load_case)
+    response_settings(at_load.gearbox, run_up, method)
+    with suppress(FailedError):  # such a failure does not apply to the selected mesh model
+        if reason := steady_lack(assembled_by_iso(at_load.gearbox, at_load.choice.variant), at_load.choice.variant):
+            raise BadInputError(reason)
+    check_friction(at_load.gearbox, at_load.choice.mesh_model)
+    at_load.begin()
+    at_load.prepare()
+    try:
+        comparison = project.measured(run_up, method)
+        fit = fitted_parameters(project.fit_measured(comparison, keys, method)) if keys else None
+    except TooShortError as error:
+        raise BadInputError(f"measurements.{run_up.name}.window_revolutions: {error}") from error
+    except FitError as error:
+        raise FailedError(f"fit: {error}") from error
+    path = at_load.measured_path(run_up.name)
+    summary = {"case": project.gearbox.source, "variant": str(project.choice.variant), **comparison.summary()}
+    Outcome(
+        verdict=_verdict(summary, comparison),
+        further=[
+            *([_foreign(summary)] if summary["foreign_orders"] else []),
+            *(_fit_line(own) for own in (fit or {"parameters": []})["parameters"]),
+        ],
+        summary={**summary, **({"fit": fit} if fit else {}), "file": str(path)},
+        tables=measured_tables(summary),
+        findings=[*comparison.findings, *_undetermined(fit), *_unnoticed()],
+        path=f"{path}, CSV tables, {path.with_suffix('.png').name}",
+    ).show(as_json, whole)
+
+
+def _verdict(summary: Mapping[str, Any], comparison: MeasuredComparison) -> str:
+    """Return how well levels and peaks agree, in one line."""
+    deviation = summary["deviation_dB"]
+    if deviation is None:
+        return f"{summary['measurement']}: no measured order is above its background"
+    text = f"{summary['measurement']}: computed levels within {deviation:.2f} dB (rms)"
+    measured_peaks = sum(not math.isnan(peak.measured_speed) for peak in comparison.peaks)
+    if measured_peaks:
+        text += f", {comparison.paired} of {measured_peaks} measured peaks found"
+        shift = summary["speed_shift_percent"]
+        text += f", speeds {shift:+.1f} %" if abs(shift) > 0.05 else ""
+    return text
+
+
+def _foreign(summary: Mapping[str, Any]) -> str:
+    """Return the orders that belong to nothing of the gearbox, in one line."""
+    orders = ", ".join(f"{own['order']:.4g}" for own in summary["foreign_orders"][:5])
+    return f"Orders of no shaft or mesh: {orders}"
+
+
+def fitted_parameters(fit: ParameterFit) -> dict[str, Any]:
+    """Summarise a fit."""
+    return {
+        "deviation_before_dB": fit.before,
+        "deviation_dB": fit.after,
+        "orders_of_channels": fit.series,
+        "evaluations": fit.evaluations,
+        "correlation": fit.correlation.tolist(),
+        "parameters": [
+            {"key": own.key, "start": own.start, "value": own.value, "interval_95_percent": [own.low, own.high],
+             "refusal": own.refusal}
+            for own in fit.parameters
+        ],
+    }  # fmt: skip
+
+
+def _fit_line(own: Mapping[str, Any]) -> str:
+    """Return a fitted parameter in one line."""
+    low, high = own["interval_95_percent"]
+    if own["refusal"]:
+        return f"Fit: {own['key']} is not determined ({own['refusal']})"
+    return f"Fit: {own['key']} = {own['value']:.4g} ({low:.4g} to {high:.4g}, 95 %), {own['start']:.4g} in the file"
+
+
+def _undetermined(fit: Mapping[str, Any] | None) -> list[Finding]:
+    """Return what a fit says, and what it assumes."""
+    if fit is None:
+        return []
+    before, after, count = fit["deviation_before_dB"], fit["deviation_dB"], fit["orders_of_channels"]
+    text = f"fit: {before:.2f} to {after:.2f} dB (rms) without the mean of each channel, {count} orders of channels"
+    return [
+        Finding(
+            "note", f"{text}; all other values are those of the file, such as inertias: errors of them shift the fit"
+        )
+    ]
+
+
+def _unnoticed() -> list[Finding]:
+    """Return what the comparison cannot notice."""
+    return [
+        Finding(
+            "note",
+            "not noticeable: peak for rms (3 dB), an amplifier that clips before its anti-aliasing filter; an "
+            "accelerometer on a cover is not the seat of a bearing",
+        )
+    ]
+
+
+def _amplitude(key: str) -> Any:
+    """Return a function that shows an amplitude in the unit of diagrams."""
+
+    def shown(row: Mapping[str, Any]) -> str:
+        unit, factor = DRAWN_UNITS[row["unit"]]
+        return f"{significant(factor * row[key], 3)} {unit}"
+
+    return shown
+
+
+def _speed(row: Mapping[str, Any]) -> float | None:
+    """Return the speed of a peak: measured, or else computed."""
+    measured_speed: float | None = row["measured_speed_rpm"]
+    return row["computed_speed_rpm"] if measured_speed is None else measured_speed
+
+
+def _seen(row: Mapping[str, Any]) -> str:
+    """Return which side has a peak that the other one lacks."""
+    if row["measured_speed_rpm"] is None:
+        return "computed only"
+    return "measured only" if row["computed_speed_rpm"] is None else f"{row['speed_difference_percent']:+.2f}"
+
+
+PEAKS = (
+    Column("order", "order"),
+    Column("channel", "channel", is_text=True),
+    Column("speed\nrpm", _speed, ".0f"),
+    Column("measured", _amplitude("measured_amplitude")),
+    Column("computed", _amplitude("computed_amplitude")),
+    Column("level\ndB", "difference_dB", "+.1f"),
+    Column("speed\n%", _seen),
+    detail("computed\nrpm", "computed_speed_rpm", ".1f"),
+)
+CHANNELS = (
+    Column("channel", "channel"),
+    Column("quantity", lambda row: row["quantity"].replace("_", " "), is_text=True),
+    Column("place", "where", is_text=True),
+    Column("levels\ndB rms", "deviation_dB", ".2f"),
+    Column("median\ndB", "offset_dB", "+.2f"),
+)
+ORDERS = (
+    Column("order", "name"),
+    Column("per\nrevolution", "order", ".4f"),
+    Column("levels\ndB rms", "deviation_dB", ".2f"),
+)
+FOREIGN = (
+    Column("order", lambda row: f"{row['order']:.3f}"),
+    Column("amplitude\nSI", "amplitude", ".3g"),
+    Column("above\nneighbours dB", "above_neighbours_dB", ".1f"),
+)
+
+
+def measured_tables(summary: Mapping[str, Any]) -> list[Table]:
+    """Return the tables of peaks, channels, orders, and orders of no shaft or mesh."""
+    low, high = summary["speeds_rpm"]
+    legend = (
+        f"Zero-to-peak; computed over measured. {summary['window']}; the computed order is swept along the measured "
+        "speed and averaged in the same windows."
+    )
+    return [
+        Table(f"Peaks, {low:.0f} to {high:.0f} rpm of the input", summary["peaks"], PEAKS, legend, noun="peaks"),
+        Table("Channels", summary["channels"], CHANNELS, "Levels within 20 dB of the highest of the channel."),
+        Table("Orders", summary["orders"], ORDERS),
+        Table("Orders of no shaft or mesh, per revolution of the input", summary["foreign_orders"], FOREIGN),
+    ]

@@ -1,0 +1,362 @@
+"""Result of a comparison with a measured run-up: cuts, peaks and findings; its files and its diagram."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.units import RPM
+from exugear.gearbox.versions import MEASURED
+from exugear.results.findings import Finding
+from exugear.results.order_tracking.foreign_orders import OrderInSpectrum
+from exugear.steady.evaluation.comparison import (
+    ComparedCuts,
+    PeakPair,
+    best_stretch,
+    compared_cuts,
+    paired_peaks,
+    resolution_text,
+    resonance_shift,
+)
+from exugear.steady.evaluation.mistakes import (
+    band_findings,
+    coverage_finding,
+    drift_finding,
+    foreign_finding,
+    level_findings,
+    measured_foreign_orders,
+    recording_findings,
+    shift_finding,
+    spectrum_of,
+    speed_finding,
+)
+from exugear.steady.evaluation.run_up import MeasuredRunUp
+from fe_ste.tools.arrays import SingleComplexes
+from fe_ste.tools.display import ReprMixin, TitledRows
+from fe_ste.tools.drawing import (
+    COLOURS,
+    COLUMN_WIDTHS,
+    axes_or_new,
+    drawable,
+    drawing_style,
+    finish_figure,
+    new_figure,
+)
+from fe_ste.tools.files import write_table
+from fe_ste.tools.stores import Store
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+DRAWN_RANGE = 60.0
+"""Range of levels that a diagram shows, dB."""
+MOST_DRAWN_ORDERS = 4
+"""Maximum number of orders in a diagram: those with the highest measured amplitudes."""
+DRAWN_UNITS = {"m": ("µm", 1e6), "N": ("N", 1.0), "m/s": ("mm/s", 1e3), "m/s2": ("m/s²", 1.0)}
+"""Unit of diagrams and tables, and its factor, by SI unit."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredComparison(ReprMixin):
+    """A measured run-up next to the steady-state response of the same gearbox."""
+
+    cuts: ComparedCuts
+    stretch: float
+    """Factor on the computed speeds with which the cuts agree best: 1.05 if computed resonances are 5 % too low."""
+    peaks: tuple[PeakPair, ...]
+    """Peaks, highest first relative to the highest amplitude of the channel."""
+    foreign: tuple[OrderInSpectrum, ...]
+    """Orders that carry power and belong to no shaft or mesh of the gearbox."""
+    findings: tuple[Finding, ...]
+    harmonics: int
+    """Harmonics of each mesh frequency in the response."""
+    input_hash: str
+    """SHA-256 of the recording, the section of the gearbox file and the input of the response."""
+
+    def _line(self) -> str:
+        return f" of {self.cuts.run_up.name!r}: {self.cuts.shape}, {self.cuts.deviation():.2f} dB (rms)"
+
+    def _table(self) -> TitledRows:
+        names = [channel.name for channel in self.cuts.run_up.channels]
+        rows = {name: f"{self.cuts.deviation(place):.2f} dB (rms)" for place, name in enumerate(names)}
+        return f"Comparison with {self.cuts.run_up.name}", {**rows, "peaks": str(len(self.peaks))}
+
+    @property
+    def paired(self) -> int:
+        """Number of peaks that both sides have."""
+        return sum(peak.paired for peak in self.peaks)
+
+    @property
+    def speed_shift(self) -> float:
+        """Computed over measured speed of resonances minus 1: see `resonance_shift`."""
+        return resonance_shift(self.peaks, self.stretch)
+
+    def plot(self, channel: str | None = None, ax: Axes | None = None) -> Axes:
+        """Draw measured and computed order cuts of a channel over the speed, with the band of plausible damping.
+
+        Orders are those with the highest measured amplitudes. The steady-state response, neither swept nor averaged, is
+        dotted.
+
+        Parameters
+        ----------
+        channel : name of the channel; the first one by default
+        ax : matplotlib axes; by default new ones, whose ``ax.figure`` can be shown and saved
+
+        Raises
+        ------
+        ValueError
+            There is no such channel.
+        """
+        names = [own.name for own in self.cuts.run_up.channels]
+        if channel is not None and channel not in names:
+            raise ValueError(f"channel = {channel!r}: must be one of {', '.join(names)}")
+        with axes_or_new(ax, COLUMN_WIDTHS[2], 4.0) as panel:
+            _draw_channel(panel, self.cuts, 0 if channel is None else names.index(channel))
+            panel.set_xlabel("Input speed / rpm")
+            panel.legend(ncols=2)
+            return panel
+
+    def summary(self) -> dict[str, Any]:
+        """All results, with units in the keys, for JSON; amplitudes are zero-to-peak, in SI units."""
+        cuts = self.cuts
+        return {
+            "measurement": cuts.run_up.name,
+            "recording": str(cuts.run_up.path),
+            "input_hash": self.input_hash,
+            "window": resolution_text(cuts.run_up),
+            "speeds_rpm": [float(cuts.speed.min()) / RPM, float(cuts.speed.max()) / RPM],
+            "deviation_dB": _known(cuts.deviation()),
+            "speed_stretch": self.stretch,
+            "speed_shift_percent": 100.0 * self.speed_shift,
+            "channels": [
+                {
+                    "channel": channel.name,
+                    "quantity": channel.quantity,
+                    "where": channel.where,
+                    "unit": channel.unit,
+                    "deviation_dB": _known(cuts.deviation(place)),
+                    "offset_dB": _known(cuts.offset(place)),
+                }
+                for place, channel in enumerate(cuts.run_up.channels)
+            ],
+            "orders": [
+                {"name": line.name, "order": line.order, "deviation_dB": _known(cuts.deviation(line=place))}
+                for place, line in enumerate(cuts.lines)
+            ],
+            "peaks": [self.peak_summary(peak) for peak in self.peaks],
+            "foreign_orders": [
+                {"order": own.order, "amplitude": own.amplitude, "above_neighbours_dB": own.prominence}
+                for own in self.foreign
+            ],
+        }
+
+    def peak_summary(self, peak: PeakPair) -> dict[str, Any]:
+        """One peak, with units in the keys."""
+        line = self.cuts.lines[peak.line]
+        channel = self.cuts.run_up.channels[peak.channel]
+        return {
+            "order": line.name,
+            "periods_per_revolution": line.order,
+            "channel": channel.name,
+            "unit": channel.unit,
+            "measured_speed_rpm": _known(peak.measured_speed / RPM),
+            "computed_speed_rpm": _known(peak.computed_speed / RPM),
+            "speed_difference_percent": _known(100.0 * peak.speed_difference),
+            "measured_amplitude": peak.measured,
+            "computed_amplitude": peak.computed,
+            "difference_dB": _known(peak.difference),
+        }
+
+    def write(self, path: Path) -> tuple[Path, ...]:
+        """Write the comparison: netCDF at `path`, and tables and a diagram next to it; return their paths.
+
+        The tables are ``...-cuts.csv``, ``...-peaks.csv`` and ``...-foreign.csv``, in SI units.
+        """
+        Store(path, self.input_hash).write_dataset(self._dataset())
+        cuts = write_table(path.with_name(f"{path.stem}-cuts.csv"), CUT_HEADINGS, self._cut_rows())
+        peaks = [[_cell(value) for value in self.peak_summary(peak).values()] for peak in self.peaks]
+        table = write_table(path.with_name(f"{path.stem}-peaks.csv"), PEAK_HEADINGS, peaks)
+        foreign = [[own.order, own.amplitude, own.prominence] for own in self.foreign]
+        headings = ("order", "amplitude", "above_neighbours_dB")
+        others = write_table(path.with_name(f"{path.stem}-foreign.csv"), headings, foreign)
+        picture = path.with_suffix(".png")
+        self._draw(picture)
+        return path, cuts, table, others, picture
+
+    def _cut_rows(self) -> Iterator[list[float | str]]:
+        cuts = self.cuts
+        for place, channel in enumerate(cuts.run_up.channels):
+            for number, line in enumerate(cuts.lines):
+                for frame, speed in enumerate(cuts.speed):
+                    at = (place, number, frame)
+                    yield [
+                        channel.name, line.name, line.order, float(cuts.time[frame]), float(speed) / RPM,
+                        float(np.abs(cuts.measured[at])), float(np.abs(cuts.computed[at])), float(cuts.steady[at]),
+                        float(cuts.background[at]),
+                    ]  # fmt: skip
+
+    def _dataset(self) -> xr.Dataset:
+        """Labelled arrays with units."""
+        import xarray as xr
+
+        cuts = self.cuts
+        over = ("channel", "line", "window")
+        kinds: dict[str, tuple[Any, str]] = {
+            "measured": (np.abs(cuts.measured), "measured order cut, zero-to-peak"),
+            "background": (cuts.background, "measured amplitude beside the order, zero-to-peak"),
+            "computed": (np.abs(cuts.computed), "computed order cut, swept and averaged as the measured one"),
+            "steady": (cuts.steady, "steady-state response at constant speed, zero-to-peak"),
+        }
+        if cuts.limits is not None:
+            kinds["lowest_damping"] = cuts.limits[0], "computed order cut with the lowest plausible damping"
+            kinds["highest_damping"] = cuts.limits[1], "computed order cut with the highest plausible damping"
+        units = {"units": "see unit"}
+        variables: dict[str, Any] = {
+            name: (over, array, {**units, "long_name": words}) for name, (array, words) in kinds.items()
+        }
+        variables |= {
+            "time": (("window",), cuts.time, {"units": "s", "long_name": "centre of the window in the recording"}),
+            "speed": (("window",), cuts.speed, {"units": "rad/s", "long_name": "speed of the overall input"}),
+            "order": (("line",), [line.order for line in cuts.lines], {"units": "1"}),
+            "unit": (("channel",), np.array([own.unit for own in cuts.run_up.channels], dtype=object), {}),
+        }
+        names = {
+            "channel": [own.name for own in cuts.run_up.channels],
+            "line": [line.name for line in cuts.lines],
+        }
+        summary = self.summary()
+        attributes = {
+            "method_version": MEASURED,
+            "measurement": cuts.run_up.name,
+            "recording_sha256": cuts.run_up.digest,
+            "window": summary["window"],
+            "speed_stretch": self.stretch,
+            "peaks": json.dumps(summary["peaks"]),
+            "foreign_orders": json.dumps(summary["foreign_orders"]),
+        }
+        return xr.Dataset(variables, {key: np.array(own, dtype=object) for key, own in names.items()}, attributes)
+
+    def _draw(self, path: Path) -> None:
+        """Draw all channels below each other."""
+        count = len(self.cuts.run_up.channels)
+        with drawing_style():
+            figure = new_figure(COLUMN_WIDTHS[2], 1.0 + 2.6 * count)
+            panels = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
+            for channel, panel in enumerate(panels):
+                _draw_channel(panel, self.cuts, channel)
+                panel.legend(ncols=2, fontsize=6.5)
+            panels[-1].set_xlabel("Input speed / rpm")
+            figure.supxlabel(
+                f"{resolution_text(self.cuts.run_up)}; amplitudes zero-to-peak", fontsize=7.0, color="#555555"
+            )
+            finish_figure(figure, path)
+
+
+CUT_HEADINGS = (
+    "channel",
+    "order_name",
+    "order",
+    "time_s",
+    "speed_rpm",
+    "measured_amplitude",
+    "computed_amplitude",
+    "steady_amplitude",
+    "background_amplitude",
+)
+PEAK_HEADINGS = (
+    "order_name",
+    "order",
+    "channel",
+    "unit",
+    "measured_speed_rpm",
+    "computed_speed_rpm",
+    "speed_difference_percent",
+    "measured_amplitude",
+    "computed_amplitude",
+    "difference_dB",
+)
+
+
+def compare_run_up(
+    gearbox: Gearbox, run_up: MeasuredRunUp, response: xr.Dataset, limits: SingleComplexes | None = None
+) -> MeasuredComparison:
+    """Compare a measured run-up with a steady-state response over its speeds.
+
+    Parameters
+    ----------
+    response : as of `exugear.steady.steady_file.stored_or_computed`
+    limits : as of `exugear.steady.evaluation.damping.damping_extremes`
+
+    Raises
+    ------
+    SteadyError
+        The response has no signal at the place of a channel.
+    TooShortError
+        The run-up is shorter than a window.
+    """
+    cuts = compared_cuts(run_up, response, limits)
+    stretch = best_stretch(cuts)
+    peaks = paired_peaks(cuts, stretch)
+    spectrum = spectrum_of(run_up)
+    foreign = measured_foreign_orders(gearbox, spectrum)
+    found: Sequence[Iterator[Finding]] = (
+        speed_finding(gearbox, run_up, spectrum),
+        recording_findings(run_up),
+        band_findings(cuts),
+        drift_finding(cuts),
+        level_findings(cuts),
+        foreign_finding(foreign, run_up),
+        coverage_finding(cuts),
+        shift_finding(resonance_shift(peaks, stretch)),
+    )
+    key = [MEASURED, run_up.digest, run_up.section.model_dump(mode="json"), str(response.attrs["input_hash"])]
+    return MeasuredComparison(
+        cuts=cuts,
+        stretch=stretch,
+        peaks=peaks,
+        foreign=foreign,
+        findings=tuple(finding for part in found for finding in part),
+        harmonics=int(response.attrs["harmonics"]),
+        input_hash=hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest(),
+    )
+
+
+def _draw_channel(panel: Axes, cuts: ComparedCuts, channel: int) -> None:
+    """Draw the cuts of a channel: measured in black tones, computed in colours with their band."""
+    own = cuts.run_up.channels[channel]
+    unit, factor = DRAWN_UNITS[own.unit]
+    measured = factor * np.abs(cuts.measured[channel])
+    highest = np.nan_to_num(measured).max(axis=1)
+    shown = sorted(np.argsort(-highest)[:MOST_DRAWN_ORDERS])
+    speed = cuts.speed / RPM
+    for number, line in enumerate(shown):
+        colour = COLOURS[number]
+        name = drawable(cuts.lines[line].name)
+        if cuts.limits is not None:
+            ends = factor * cuts.limits[:, channel, line]
+            panel.fill_between(speed, ends.min(axis=0), ends.max(axis=0), color=colour, alpha=0.15, linewidth=0.0)
+        panel.plot(speed, factor * np.abs(cuts.computed[channel, line]), color=colour, linewidth=0.9, linestyle="--")
+        panel.plot(speed, measured[line], color=colour, linewidth=1.4, label=name)
+        panel.plot(speed, factor * cuts.steady[channel, line], color=colour, linewidth=0.6, linestyle=":")
+    top = float(highest.max())
+    panel.set(yscale="log", ylim=(top * 10.0 ** (-DRAWN_RANGE / 20.0), 2.0 * top), xlim=(speed.min(), speed.max()))
+    panel.yaxis.set_major_formatter("{x:g}")
+    panel.set_ylabel(drawable(f"{own.name}: {own.quantity.replace('_', ' ')}, ± {unit}"))
+    panel.set_title("solid: measured; dashed: computed, swept; dotted: steady; band: damping", loc="left", fontsize=7.0)
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _cell(value: float | str | None) -> float | str:
+    return "" if value is None else value

@@ -1,0 +1,266 @@
+"""A measured run-up of a gearbox file: signals in SI units, the angle of the input, and what each channel measured."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from exugear.exchange.recordings.reading import read_recording
+from exugear.exchange.recordings.recording import RecordedChannel, Recording, RecordingError
+from exugear.exchange.series_files import LARGEST_SERIES
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.reading import known_names
+from exugear.gearbox.sections.measurements import MeasuredChannelSection, MeasurementSection
+from exugear.gearbox.units import MEASURED_UNITS, RPM, Unit, unit_of
+from exugear.results.order_tracking.angle_cuts import AngleWindow
+from exugear.results.order_tracking.shaft_angle import ShaftAngle, SpeedSignalError, angle_of_speed, angle_of_tacho
+from exugear.steady.mean_system.rotating_frame import SteadyError
+from exugear.steady.settings import USUAL_COUNT, Method, SpeedRange, SteadySettings, check_speeds, usual_speeds
+from fe_ste.tools.arrays import Complexes, Floats
+from fe_ste.tools.display import ReprMixin
+from fe_ste.tools.files import file_digest
+
+LEAST_RANGE = 1.1
+"""Lowest ratio of the highest to the lowest speed of a run-up."""
+BEYOND = 0.02
+"""Fraction by which the speeds of the response exceed those of the run-up on both sides."""
+AXES = ("x", "y", "z")
+SIGNALS = {"force": "support_force", "transmission_error": "overall_dte"}
+"""Signal of the steady-state response by measured quantity; motions follow from the acceleration of the seat."""
+SEAT = "seat_acceleration"
+INTEGRATIONS = {"acceleration": 0, "velocity": 1, "displacement": 2}
+"""Number of integrations over time from the acceleration."""
+SI_UNITS = {
+    "acceleration": "m/s2",
+    "velocity": "m/s",
+    "displacement": "m",
+    "transmission_error": "m",
+    "force": "N",
+}
+
+
+@dataclass(frozen=True)
+class MeasuredChannel:
+    """What a channel measured."""
+
+    name: str
+    quantity: str
+    place: str
+    """Bearing or mount; empty for the transmission error."""
+    direction: tuple[float, float, float]
+    """Unit vector in the axes of the gearbox; zero for the transmission error."""
+
+    @property
+    def unit(self) -> str:
+        """SI unit."""
+        return SI_UNITS[self.quantity]
+
+    @property
+    def where(self) -> str:
+        """Place and direction as text, such as ``middle_right y``."""
+        if not self.place:
+            return "overall"
+        axis = next((name for name, part in zip(AXES, self.direction, strict=True) if part == 1.0), None)
+        vector = "(" + ", ".join(f"{part:.3g}" for part in self.direction) + ")"
+        return f"{self.place} {axis or vector}"
+
+    def computed(self, names: Sequence[str], amplitude: Complexes, frequency: Floats) -> Complexes | None:
+        """Complex amplitude (...) of the quantity from those of all signals (..., signals) at frequencies (...), Hz.
+
+        None if the response has no such signal. Velocity and displacement are the acceleration over i w and (i w)^2.
+
+        Examples
+        --------
+        >>> channel = MeasuredChannel("left", "velocity", "left", (1.0, 0.0, 0.0))
+        >>> names = [f"seat_acceleration left {axis}" for axis in AXES]
+        >>> channel.computed(names, np.array([[2.0 * np.pi, 0.0, 0.0]]), np.array([1.0])).round(6)
+        array([0.-1.j])
+        """
+        if not self.place:
+            signal = SIGNALS[self.quantity]
+            return amplitude[..., names.index(signal)] if signal in names else None
+        kind = SIGNALS.get(self.quantity, SEAT)
+        wanted = [f"{kind} {self.place} {axis}" for axis in AXES]
+        if not set(wanted) <= set(names):
+            return None
+        vector = amplitude[..., [names.index(name) for name in wanted]] @ np.array(self.direction)
+        turns = INTEGRATIONS.get(self.quantity, 0)
+        return np.asarray(vector / (2j * np.pi * frequency) ** turns)
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredRunUp(ReprMixin, line=" {name!r}: {values.shape[0]} channels, {shaft!r}"):
+    """A recorded run-up in SI units."""
+
+    name: str
+    """Name of its table in the gearbox file."""
+    section: MeasurementSection
+    path: Path
+    digest: str
+    """SHA-256 of the file."""
+    shaft: ShaftAngle
+    """Angle of the overall input."""
+    per: float
+    """Speed of the shaft with the tacho or the speed signal over that of the input, without sign."""
+    speed_shaft: str
+    channels: tuple[MeasuredChannel, ...]
+    values: Floats
+    """(channels, n) signals without their means, SI, at the samples of `shaft`."""
+    clipped: dict[str, float]
+    """Fraction of samples at the limits, by channel."""
+
+    @property
+    def window(self) -> AngleWindow:
+        """Window of order cuts, over revolutions of the shaft with the tacho or the speed signal."""
+        return AngleWindow(self.section.window_revolutions)
+
+
+def measurement_of(gearbox: Gearbox, name: str | None) -> tuple[str, MeasurementSection]:
+    """Look up a measurement of a gearbox file; the only one without a name.
+
+    Raises
+    ------
+    GearboxFileError
+        There is no such measurement, or several and no name.
+    """
+    known = gearbox.case.measurements
+    if name is None and len(known) == 1:
+        name = next(iter(known))
+    if name is None or name not in known:
+        wanted = "specify one of them" if name is None else f"no measurement {name!r}"
+        raise gearbox.error(f"measurements: {wanted}; {known_names('measurements', known, 'measurements.NAME')}")
+    return name, known[name]
+
+
+def read_run_up(gearbox: Gearbox, name: str | None = None) -> MeasuredRunUp:
+    """Read a measured run-up that a gearbox file names.
+
+    Parameters
+    ----------
+    name : name of its table; not needed if there is only one
+
+    Raises
+    ------
+    GearboxFileError
+        There is no such measurement, the recording cannot be used, a channel has no known unit, or no angle follows
+        from the tacho or the speed signal.
+    """
+    name, section = measurement_of(gearbox, name)
+    key = f"measurements.{name}"
+    path = gearbox.file(f"{key}.file", section.file, LARGEST_SERIES)
+    source = section.tacho or section.speed
+    assert source is not None  # checked with the section
+    files = {own: channel.channel or own for own, channel in section.channels.items()}
+    try:
+        recording = read_recording(path, list(dict.fromkeys([source.channel, *files.values()])))
+    except RecordingError as error:
+        raise gearbox.error(f"{key}.file = {section.file!r}: {error}") from None
+    turning, per = _shaft_angle(gearbox, key, section, recording)
+    shaft = turning.of_shaft(1.0 / per)
+    slowest, fastest = float(shaft.speed.min()), float(shaft.speed.max())
+    if fastest < LEAST_RANGE * slowest:
+        raise gearbox.error(
+            f"{key}: the speed of the input is {slowest / RPM:.4g} to {fastest / RPM:.4g} rpm; a run-up or run-down "
+            f"over at least {100.0 * (LEAST_RANGE - 1.0):.0f} % is required"
+        )
+    part = slice(shaft.first, shaft.first + shaft.angle.size)
+    values = []
+    for own, channel in section.channels.items():
+        recorded = recording.channel(files[own])
+        factor = _factor(gearbox, f"{key}.channels.{own}", channel, recorded)
+        if not np.ptp(recorded.values[part]) > 0.0:
+            raise gearbox.error(
+                f"{key}.channels.{own}: channel {recorded.name!r} is constant ({recorded.values[part][0]:g}); connect "
+                "its sensor, or remove the channel"
+            )
+        values.append(factor * (recorded.values[part] - recorded.values[part].mean()))
+    return MeasuredRunUp(
+        name=name,
+        section=section,
+        path=path,
+        digest=file_digest(path),
+        shaft=shaft,
+        per=per,
+        speed_shaft=source.shaft,
+        channels=tuple(_measured(own, channel) for own, channel in section.channels.items()),
+        values=np.array(values),
+        clipped={own: recording.channel(files[own]).clipped for own in section.channels},
+    )
+
+
+def response_settings(gearbox: Gearbox, run_up: MeasuredRunUp, method: Method = "parametric") -> SteadySettings:
+    """Return the settings of the response to compare with: its speeds cover those of the run-up.
+
+    Raises
+    ------
+    GearboxFileError
+        A speed is implausibly high, most often because of a wrong shaft or unit.
+    """
+    sense = math.copysign(1.0, usual_speeds(gearbox).last)
+    first, last = float(run_up.shaft.speed.min()), float(run_up.shaft.speed.max())
+    speeds = SpeedRange(sense * (1.0 - BEYOND) * first, sense * (1.0 + BEYOND) * last, USUAL_COUNT)
+    try:
+        check_speeds(gearbox, speeds)
+    except SteadyError as error:
+        kind = "speed" if run_up.section.tacho is None else "tacho"
+        raise gearbox.error(f"measurements.{run_up.name}.{kind}: {error}; check shaft, unit and pulses") from None
+    return SteadySettings(speeds, method)
+
+
+def _shaft_angle(
+    gearbox: Gearbox, key: str, section: MeasurementSection, recording: Recording
+) -> tuple[ShaftAngle, float]:
+    """Angle of the shaft with the tacho or speed signal, and its speed over that of the input."""
+    if section.tacho is not None:
+        kind, channel, shaft = "tacho", section.tacho.channel, section.tacho.shaft
+    else:
+        assert section.speed is not None
+        kind, channel, shaft = "speed", section.speed.channel, section.speed.shaft
+    per = abs(gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0).get(shaft, 0.0))
+    if not per > 0.0:
+        raise gearbox.error(
+            f"{key}.{kind}.shaft = {shaft!r}: does not turn with the overall input {gearbox.case.overall.input!r}; "
+            "name a shaft whose speed is in a fixed ratio to it"
+        )
+    recorded = recording.channel(channel)
+    try:
+        if section.tacho is not None:
+            return angle_of_tacho(recorded.values, recording.rate, section.tacho.pulses_per_revolution), per
+        assert section.speed is not None
+        unit = _unit(gearbox, f"{key}.speed", section.speed.unit, recorded, "speed")
+        return angle_of_speed(unit.factor * recorded.values, recording.rate), per
+    except SpeedSignalError as error:
+        raise gearbox.error(f"{key}.{kind}.channel = {channel!r}: {error}") from None
+
+
+def _unit(gearbox: Gearbox, key: str, stated: str | None, recorded: RecordedChannel, quantity: str) -> Unit:
+    """Return the unit of a channel: that of the gearbox file, or else that of the recording."""
+    unit = recorded.known_unit if stated is None else unit_of(stated, any_case=True)
+    kind, examples = MEASURED_UNITS[quantity]
+    if unit is None or unit.quantity != kind:
+        written = f"the unit {recorded.unit!r} in the file" if recorded.unit else "no unit in the file"
+        raise gearbox.error(
+            f"{key}: channel {recorded.name!r} has {written}, which is not one of {quantity}; set unit = ... such as "
+            f"{examples}"
+        )
+    return unit
+
+
+def _factor(gearbox: Gearbox, key: str, section: MeasuredChannelSection, recorded: RecordedChannel) -> float:
+    """Factor from the values of a recording to SI."""
+    unit = _unit(gearbox, key, section.unit, recorded, section.quantity)
+    return unit.factor * (1.0 if section.full_scale is None else section.full_scale)
+
+
+def _measured(name: str, section: MeasuredChannelSection) -> MeasuredChannel:
+    direction = section.direction
+    if isinstance(direction, str):
+        x, y, z = (float(axis == direction) for axis in AXES)
+    else:
+        x, y, z = direction or (0.0, 0.0, 0.0)
+    length = math.hypot(x, y, z) or 1.0
+    return MeasuredChannel(name, section.quantity, section.place or "", (x / length, y / length, z / length))

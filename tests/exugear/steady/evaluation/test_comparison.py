@@ -1,0 +1,347 @@
+"""Measured run-ups next to the steady-state response: known signals, known mistakes, and what the command prints."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.reading import GearboxFileError
+from exugear.gearbox.units import RPM, STANDARD_GRAVITY
+from exugear.project import Project
+from exugear.steady.evaluation.measured_comparison import MeasuredComparison, compare_run_up
+from exugear.steady.evaluation.run_up import read_run_up, response_settings
+from exugear.steady.mean_system.rotating_frame import SteadyError
+
+from ...cases.command import exugear
+from . import synthetic
+
+Signals = dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A gearbox, its response, and signals (with 5 % noise), angle and speed of a run-up that has this response."""
+
+    response: xr.Dataset
+    signals: Signals
+    angle: np.ndarray
+    speed: np.ndarray
+
+    def compared(
+        self, folder: Path, signals: Signals | None = None, pulses: int = 1, **changes: Any
+    ) -> MeasuredComparison:
+        """Comparison of a recording of the signals, read from its file, with the response."""
+        synthetic.recorded(folder / "bench.h5", self.signals if signals is None else signals, self.angle, pulses)
+        gearbox = Gearbox.from_toml(synthetic.gearbox_file(folder, synthetic.measurement(**changes)))
+        return compare_run_up(gearbox, read_run_up(gearbox), self.response)
+
+
+@pytest.fixture(scope="module")
+def bench() -> Bench:
+    _, speed, angle = synthetic.run_up()
+    response = synthetic.response(Gearbox.from_dict(synthetic.content()))
+    return Bench(response, synthetic.signals(response, speed, angle, noise=0.05), angle, speed)
+
+
+@pytest.fixture(scope="module")
+def good(bench: Bench, tmp_path_factory: pytest.TempPathFactory) -> MeasuredComparison:
+    """The comparison of a correct measurement."""
+    return bench.compared(tmp_path_factory.mktemp("good"))
+
+
+@pytest.fixture
+def short(bench: Bench, tmp_path: Path) -> Path:
+    """A short recording, for errors that are found before its orders are cut."""
+    signals = {name: own[:40000] for name, own in bench.signals.items()}
+    return synthetic.recorded(tmp_path / "bench.h5", signals, bench.angle[:40000])
+
+
+def warnings(comparison: MeasuredComparison) -> str:
+    return "\n".join(finding.text for finding in comparison.findings if finding.level == "warning")
+
+
+def test_cuts_of_a_run_up_with_noise_run_out_and_drift_are_those_of_the_model(good: MeasuredComparison) -> None:
+    """Levels within 0.1 dB rms and 0.5 dB at most (noise of 5 %), speeds of all peaks within 0.1 % in the median."""
+    assert good.cuts.deviation() < 0.1
+    assert np.abs(good.cuts.difference[good.cuts.compared]).max() < 0.5
+    shifts = [peak.speed_difference for peak in good.peaks if peak.paired]
+    assert len(shifts) >= 8
+    assert np.median(np.abs(shifts)) < 1e-3
+    assert good.stretch == 1.0
+
+
+def test_a_correct_measurement_has_no_warning_and_no_foreign_order(good: MeasuredComparison) -> None:
+    assert warnings(good) == ""
+    assert good.foreign == ()
+
+
+def test_the_steady_response_that_is_not_swept_is_further_off(bench: Bench, tmp_path: Path) -> None:
+    """By the window alone: 32 revolutions average over the resonances."""
+    cuts = bench.compared(tmp_path, window_revolutions=32.0).cuts
+    plain = 20.0 * np.log10(cuts.steady / np.abs(cuts.measured))[cuts.compared]
+    assert np.sqrt(np.mean(plain**2)) > 5.0 * cuts.deviation()
+
+
+@pytest.mark.parametrize("factor", [0.95, 1.06])
+def test_the_shift_of_resonances_has_the_sense_of_their_speeds(bench: Bench, tmp_path: Path, factor: float) -> None:
+    """Computed at speeds that are wrong by a factor: found within 0.5 %, and peaks are still paired."""
+    speed = bench.response["speed"]
+    other = replace(bench, response=bench.response.assign(speed=speed * factor))
+    found = other.compared(tmp_path)
+    assert found.speed_shift == pytest.approx(factor - 1.0, abs=5e-3)
+    assert found.paired >= 6
+    assert any("check stiffness" in finding.text for finding in found.findings)
+
+
+def in_g(signals: Signals) -> Signals:
+    return {**signals, "left": signals["left"] / STANDARD_GRAVITY}
+
+
+def clipped(signals: Signals) -> Signals:
+    limit = 0.6 * signals["left"].max()
+    return {**signals, "left": np.clip(signals["left"], -limit, limit)}
+
+
+def velocity(signals: Signals) -> Signals:
+    return {**signals, "left": synthetic.integrated(signals["left"])}
+
+
+MISTAKES: dict[str, tuple[Callable[[Signals], Signals], dict[str, Any], int, str]] = {
+    "in g": (in_g, {}, 1, 'channel left: .* g taken for m/s2.*probably "g"'),
+    "velocity": (velocity, {}, 1, "channel left: .* rise by .*channels.left.quantity is probably velocity"),
+    "clipped": (clipped, {}, 1, "channel left is clipped: .* widen its range"),
+    "two pulses": (dict, {}, 2, "tacho is probably pulses_per_revolution = 2"),
+    "other shaft": (dict, {"tacho": {"channel": "tacho", "shaft": "middle"}}, 1, 'tacho is probably shaft = "input"'),
+    "high orders": (dict, {"harmonics": 8}, 1, "sampling rate 12000 Hz: .*8 x stage_1 exceed 0.45 of it"),
+}
+"""Changed signals, changed keys, pulses per revolution, and what the warning says."""
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_of_the_measurement_is_named(bench: Bench, tmp_path: Path, mistake: str) -> None:
+    change, section, pulses, words = MISTAKES[mistake]
+    found = bench.compared(tmp_path, change(bench.signals), pulses, **section)
+    assert re.search(words, warnings(found)), warnings(found)
+
+
+def test_a_velocity_is_compared_as_such(bench: Bench, tmp_path: Path) -> None:
+    """Integral of the acceleration over time: levels as those of the acceleration."""
+    own = {**synthetic.CHANNELS, "left": {**synthetic.CHANNELS["left"], "quantity": "velocity", "unit": "m/s"}}
+    found = bench.compared(tmp_path, velocity(bench.signals), channels=own)
+    assert found.cuts.deviation(0) < 0.1
+    assert warnings(found) == ""
+
+
+def test_a_second_machine_is_listed_with_its_order(bench: Bench, tmp_path: Path) -> None:
+    other = {name: own + 0.5 * own.std() * np.cos(7.41 * bench.angle) for name, own in bench.signals.items()}
+    found = bench.compared(tmp_path, other)
+    assert [own.order for own in found.foreign] == pytest.approx([7.41], abs=0.02)
+    assert "orders 7.4" in warnings(found)
+
+
+def test_a_speed_signal_serves_as_a_tacho_does(bench: Bench, tmp_path: Path, good: MeasuredComparison) -> None:
+    """Speed of the output in rpm without error: levels as with the tacho, within 0.05 dB."""
+    ratio = Gearbox.from_dict(synthetic.content()).train.ratio
+    source = {"channel": "n", "shaft": "output", "unit": "rpm"}
+    signals = {**bench.signals, "n": ratio * bench.speed / RPM}
+    found = bench.compared(tmp_path, signals, tacho=None, speed=source, window_revolutions=1.0)
+    assert found.cuts.run_up.per == pytest.approx(abs(ratio))
+    assert found.cuts.deviation() < good.cuts.deviation() + 0.05
+
+
+@pytest.mark.parametrize(("factor", "delay"), [(1.0, 0.0), (1.002, 0.0), (1.0, 0.1)])
+def test_an_inaccurate_or_late_speed_signal_is_named(bench: Bench, tmp_path: Path, factor: float, delay: float) -> None:
+    """0.2 % of calibration, and 0.1 s of delay at 3 %/s in the middle of the run-up: both blur the highest orders."""
+    time = np.arange(bench.speed.size) / synthetic.RATE
+    late = np.interp(time - delay, time, bench.speed)
+    source = {"channel": "n", "shaft": "input", "unit": "rpm"}
+    found = bench.compared(tmp_path, {**bench.signals, "n": factor * late / RPM}, tacho=None, speed=source)
+    if factor == 1.0 and delay == 0.0:
+        assert warnings(found) == ""
+        assert found.cuts.speed_error == pytest.approx(0.0, abs=2e-5)
+    else:
+        assert "speed: by the phases of the mesh orders the true speed differs by" in warnings(found)
+    if factor != 1.0:
+        assert found.cuts.speed_error == pytest.approx(1.0 / factor - 1.0, rel=0.05)
+
+
+def left(**changes: Any) -> dict[str, Any]:
+    return {"channels": {"left": {**synthetic.CHANNELS["left"], **changes}}}
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"tacho": {"channel": "tacho", "shaft": "inputs"}}, "bench.tacho.shaft = 'inputs': no such shaft; shafts are"),
+        ({"tacho": None}, "set either tacho = .* or speed ="),
+        ({"load_case": "full"}, "load_case = 'full': no such load case; load cases are run_up"),
+        ({"window_revolutions": 0.5}, "window_revolutions = 0.5: must lie between 1 and 1000"),
+        ({"file": "../bench.h5"}, "outside the folder of the gearbox file|no such file"),
+        ({"channels": {"left": {"quantity": "acceleration"}}}, "place is required for acceleration; set place ="),
+        ({"channels": {"te": {"quantity": "transmission_error", "place": "a"}}}, "place does not apply"),
+        (left(place="left"), "place = 'left': no such place; bearings and mounts are"),
+        (left(unit="mm"), "unit = 'mm': a unit of length; set a unit of acceleration"),
+        (left(direction=[0, 0, 0]), "direction = .*: has no length"),
+        (left(full_scale=5.0), "full_scale requires unit"),
+        ({"channels": {"te": {"quantity": "transmission_error"}}}, "channel 'te' has no unit in the file.* set unit"),
+        ({"channels": {"up": synthetic.CHANNELS["left"]}}, "no channel 'up'; "),
+    ],
+)
+def test_an_error_of_the_section_names_key_value_and_remedy(short: Path, change: dict[str, Any], message: str) -> None:
+    path = synthetic.gearbox_file(short.parent, synthetic.measurement(**change))
+    with pytest.raises(GearboxFileError, match=message):
+        read_run_up(Gearbox.from_toml(path))
+
+
+def test_a_channel_without_signal_is_refused(bench: Bench, tmp_path: Path) -> None:
+    with pytest.raises(GearboxFileError, match="channels.left: channel 'left' is constant .0.; connect its sensor"):
+        bench.compared(tmp_path, {**bench.signals, "left": np.zeros(bench.angle.size)})
+
+
+def test_a_recording_at_constant_speed_is_refused(bench: Bench, tmp_path: Path) -> None:
+    steady = replace(bench, angle=100.0 * np.arange(bench.angle.size) / synthetic.RATE)
+    with pytest.raises(GearboxFileError, match="speed of the input is 954.9 to 954.9 rpm; a run-up or run-down"):
+        steady.compared(tmp_path)
+
+
+def test_noise_alone_is_below_what_counts(bench: Bench, tmp_path: Path) -> None:
+    """Of 18 cuts of 1,000 windows each, noise exceeds its background by 10 dB in less than one of 100 windows."""
+    rng = np.random.default_rng(1)
+    found = bench.compared(tmp_path, {name: rng.standard_normal(bench.angle.size) for name in bench.signals})
+    assert found.cuts.compared.mean() < 0.01
+
+
+def test_a_response_without_excitation_is_refused(bench: Bench, tmp_path: Path) -> None:
+    silent = bench.response.assign(amplitude=0.0 * bench.response["amplitude"])
+    with pytest.raises(SteadyError, match="excites no vibration.*use --mesh-model line_of_action"):
+        replace(bench, response=silent).compared(tmp_path)
+
+
+def test_an_impossible_speed_names_the_key_of_the_speed(short: Path) -> None:
+    section = synthetic.measurement(tacho={"channel": "tacho", "shaft": "output"})
+    gearbox = Gearbox.from_toml(synthetic.gearbox_file(short.parent, section))
+    run_up = read_run_up(gearbox)
+    with pytest.raises(GearboxFileError, match="measurements.bench.tacho: speeds .* tip speed .*; check shaft"):
+        response_settings(gearbox, replace(run_up, shaft=run_up.shaft.of_shaft(30.0)))
+
+
+def test_a_variant_without_the_place_is_refused_with_a_remedy(bench: Bench, tmp_path: Path) -> None:
+    kept = [name for name in bench.response["signal"].to_numpy() if not str(name).startswith("seat_acceleration")]
+    with pytest.raises(
+        SteadyError, match="channels.left.place = 'input_left'.*no acceleration there.*use --variant bushing"
+    ):
+        replace(bench, response=bench.response.sel(signal=kept)).compared(tmp_path)
+
+
+@pytest.mark.validation
+def test_the_command_prints_peaks_and_writes_its_files(bench: Bench, tmp_path: Path) -> None:
+    """Output of all commands: one line, one table of ten rows in 80 columns, warnings, path last.
+
+    The response of the command, with a grid of its own, agrees with the signals as well; its band of damping encloses
+    the cuts at their peaks.
+    """
+    synthetic.recorded(tmp_path / "bench.h5", bench.signals, bench.angle)
+    path, out = synthetic.gearbox_file(tmp_path, synthetic.measurement()), tmp_path / "results"
+    outcome = exugear("measured", path, "--out", out)
+    assert outcome.exit_code == 0, outcome.stderr
+    lines = outcome.stdout.splitlines()
+    assert lines[0].startswith("bench: computed levels within 0.0")
+    assert "measured peaks found" in " ".join(lines[:2])
+    assert all(len(line) <= 80 for line in lines[:-1])
+    assert lines[-1].startswith("Results: ")
+    folder = out / "bushing" / "line_of_action-discs"
+    assert {file.name for file in folder.iterdir()} == {
+        "measured-bench.nc", "measured-bench-steady.nc", "measured-bench.png", "measured-bench-cuts.csv",
+        "measured-bench-peaks.csv", "measured-bench-foreign.csv",
+    }  # fmt: skip
+    as_json = json.loads(exugear("measured", path, "bench", "--out", out, "--json").stdout)
+    with (folder / "measured-bench-peaks.csv").open() as file:
+        rows = [*csv.DictReader(file)]
+    assert len(rows) == len(as_json["peaks"])
+    assert float(rows[0]["measured_amplitude"]) == pytest.approx(as_json["peaks"][0]["measured_amplitude"], rel=1e-8)
+    assert as_json["orders"][0]["deviation_dB"] < 0.2
+    assert [finding["level"] for finding in as_json["findings"]] == ["note"]
+    found = Project.from_toml(path, out, synthetic.CHOICE).measured()
+    assert found.input_hash == as_json["input_hash"]
+    limits = found.cuts.limits
+    assert limits is not None
+    for peak in found.peaks[:5]:
+        at = (peak.channel, peak.line, int(np.argmin(np.abs(found.cuts.speed - peak.computed_speed))))
+        assert limits[1][at] < np.abs(found.cuts.computed[at]) < limits[0][at]
+
+
+@pytest.mark.validation
+def test_a_fit_finds_housing_stiffness_and_damping_of_another_gearbox(tmp_path: Path) -> None:
+    """Signals of a gearbox with 0.62 and 1.5 % instead of 0.5 and 2 %, gains off by 1 dB: both within intervals."""
+    _, speed, angle = synthetic.run_up()
+    changes = {"housing.factor": 0.62, "damping.modal_percent": 1.5}
+    own = synthetic.signals(
+        synthetic.response(Gearbox.from_dict(synthetic.content()).varied(changes)), speed, angle, 0.05
+    )
+    gains = {"left": 1.12, "right": 0.9, "te": 1.05}
+    synthetic.recorded(tmp_path / "bench.h5", {name: gains[name] * values for name, values in own.items()}, angle)
+    path = synthetic.gearbox_file(tmp_path, synthetic.measurement())
+    outcome = exugear("measured", path, "--out", tmp_path / "r", "--fit", ",".join(changes), "--json")
+    assert outcome.exit_code == 0, outcome.stderr
+    fit = json.loads(outcome.stdout)["fit"]
+    for found, (key, true) in zip(fit["parameters"], changes.items(), strict=True):
+        assert (found["key"], found["refusal"]) == (key, "")
+        assert found["interval_95_percent"][0] <= true <= found["interval_95_percent"][1], found
+        assert found["value"] == pytest.approx(true, rel=0.02)
+    assert fit["deviation_dB"] < 0.1 < fit["deviation_before_dB"]
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        (
+            "housing.factr",
+            "fit of housing.factr: the file has no such number above zero; did you mean 'housing.factor'",
+        ),
+        ("gears.pinion_1.teeth", r"no such number above zero; single numbers of \[bearings\], \[couplings\], "),
+        ("housing.factor,housing.factor", "one to 3 different keys can be fitted"),
+        ("a,b,c,d", "one to 3 different keys can be fitted"),
+    ],
+)
+def test_a_key_that_cannot_be_fitted_ends_with_code_2(short: Path, keys: str, message: str) -> None:
+    path = synthetic.gearbox_file(short.parent, synthetic.measurement())
+    outcome = exugear("measured", path, "--out", short.parent / "results", "--fit", keys)
+    assert outcome.exit_code == 2
+    assert re.search(message, outcome.stderr), outcome.stderr
+    assert not (short.parent / "results").exists()
+
+
+@pytest.mark.parametrize("damage", ["truncated", "no name", "two measurements"])
+def test_a_bad_recording_or_name_ends_with_code_2_and_writes_nothing(short: Path, damage: str) -> None:
+    folder = short.parent
+    if damage == "truncated":
+        short.write_bytes(short.read_bytes()[:-1000])
+    sections = [synthetic.measurement()] * (2 if damage == "two measurements" else 1)
+    path = synthetic.gearbox_file(folder, *sections)
+    name = ["benches"] if damage == "no name" else []
+    outcome = exugear("measured", path, *name, "--out", folder / "results")
+    assert outcome.exit_code == 2, outcome.stdout
+    words = {
+        "truncated": "measurements.bench.file = 'bench.h5'",
+        "no name": "no measurement 'benches'; measurements are bench",
+        "two measurements": "specify one of them; measurements are bench, bench_2",
+    }
+    assert words[damage] in outcome.stderr
+    assert not (folder / "results").exists()
+
+
+def test_a_channel_can_be_drawn_alone(good: MeasuredComparison) -> None:
+    axes = good.plot("te")
+    assert axes.get_ylabel() == "te: transmission error, ± µm"
+    with pytest.raises(ValueError, match="channel = 'top': must be one of left, right, te"):
+        good.plot("top")
