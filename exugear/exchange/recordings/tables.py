@@ -25,8 +25,9 @@ from exugear.exchange.recordings.recording import (
     places_of,
     recording_of,
 )
-from exugear.exchange.series_files import first_lines, fortran_number, numbers
+from exugear.exchange.series_files import first_lines, numbers
 from exugear.gearbox.units import unit_of, unit_suffix
+from fe_ste.tools.numbers import fortran_number
 
 SEPARATORS = (";", "\t", ",")
 _BRACKETED = re.compile(r"^(.*?)\s*/?\s*[\[(]([^\[\]]*?)[\])]\s*$")
