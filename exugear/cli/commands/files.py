@@ -201,7 +201,7 @@ def export(
     whole: options.AllOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Write results into a copy of a REXS file, or matrices or loads for finite-element programs.
+    """Write results into a copy of a REXS file, or matrices or loads.
 
     In a REXS file, geometry and static forces are always written; tables, modes, bearings and runs if the results
     folder has them. Use --shifts and --distances of the import.
