@@ -281,6 +281,7 @@ def test_the_command_prints_peaks_and_writes_its_files(bench: Bench, tmp_path: P
 
 
 @pytest.mark.validation
+@pytest.mark.long
 def test_a_fit_finds_housing_stiffness_and_damping_of_another_gearbox(tmp_path: Path) -> None:
     """Signals of a gearbox with 0.62 and 1.5 % instead of 0.5 and 2 %, gains off by 1 dB: both within intervals."""
     _, speed, angle = synthetic.run_up()

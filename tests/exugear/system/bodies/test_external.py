@@ -113,6 +113,7 @@ def test_a_box_in_other_axes_is_turned_and_shifted_back(
 
 
 @pytest.mark.validation
+@pytest.mark.long
 def test_runs_by_both_solvers_of_a_box_from_matrices(tmp_path: Path, box: InterfaceMatrices) -> None:
     assembly = assembled(box_of(tmp_path, write(tmp_path, box)), Choice("flexible"), STIFFNESS)
     start = accelerating_start(assembly, LOAD, 5.0)
