@@ -104,7 +104,7 @@ def crossings(
     lines = [int(line) for line in np.flatnonzero(~several) if line]
     middle = float(model.system.speeds[1])
     forces = forcing(model.at(middle))[lines]
-    loads = _loads_beside(model, middle)[lines]
+    loads = model.shaft_loads(middle)[lines]
     met = _passages(tracks, model.lines.orders[lines])
     if not met:
         return ()
@@ -316,7 +316,7 @@ def contributions(model: HarmonicBalanceModel, speed: float, line: int) -> Contr
     for wave, part in zip(model.waves.waves, parts, strict=True):
         meshes[wave.family] = meshes.get(wave.family, 0.0) + _share(complex(part), total)
     for source in dict.fromkeys(filter(None, model.shaft_orders.source)):
-        if part := complex(2.0 * adjoint @ _loads_beside(model, speed, source)[line]):
+        if part := complex(2.0 * adjoint @ model.shaft_loads(speed, source)[line]):
             meshes[source] = meshes.get(source, 0.0) + _share(part, total)
     supports, bodies = _derivatives(model, speed, frequency, adjoint, motion, total)
     modes = _modes(model, speed, frequency, loads, row, total)
@@ -348,16 +348,7 @@ def _excitation(model: HarmonicBalanceModel, speed: float, line: int) -> tuple[C
     excess = transmission_errors(model, ports, speed)[line]
     excess[:, DEFLECTION] += mean_deviation_forces(model, speed)[line]
     forces = -2.0 * model.loads(ports) * excess.ravel()
-    return forces, np.asarray(forces.sum(axis=1) + 2.0 * _loads_beside(model, speed)[line])
-
-
-def _loads_beside(model: HarmonicBalanceModel, speed: float, source: str | None = None) -> Complexes:
-    """Generalized forces (n, size) beside those of the meshes: of deviations and stated torques, or of one torque."""
-    slow = model.shaft_orders
-    if not slow.sidebands:
-        return np.zeros((len(model.lines.index), model.system.size), dtype=complex)
-    counted = np.array([source in (None, name) for name in slow.source])
-    return slow.at_lines(slow.reaction * counted[:, None], model.lines, len(model.waves.base_orders), speed)
+    return forces, np.asarray(forces.sum(axis=1) + 2.0 * model.shaft_loads(speed)[line])
 
 
 def _share(part: complex, total: complex) -> float:

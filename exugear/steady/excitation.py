@@ -606,16 +606,21 @@ class HarmonicBalanceModel:
         has_friction = self.waves.assembly.gearbox.case.damping.tooth_friction != 0.0
         if not (has_friction or self.shaft_orders.sidebands):
             return np.zeros((0, 0, 0), dtype=complex)
-        meshes = len(self.waves.base_orders)
         found = []
         for speed in map(float, self.system.speeds):
-            loads = np.zeros((len(self.lines.index), self.system.size), dtype=complex)
-            if self.shaft_orders.sidebands:
-                loads += self.shaft_orders.at_lines(self.shaft_orders.reaction, self.lines, meshes, speed)
+            loads = self.shaft_loads(speed)
             if has_friction:
-                loads += tooth_friction(self.waves, self.lines, self.ports_at(speed), speed, self.harmonics)
+                loads = loads + tooth_friction(self.waves, self.lines, self.ports_at(speed), speed, self.harmonics)
             found.append(loads)
         return np.array(found)
+
+    def shaft_loads(self, speed: float, source: str | None = None) -> Complexes:
+        """Generalized forces (n, size) of deviations and stated torques at the lines, or those of one stated torque."""
+        orders = self.shaft_orders
+        if not orders.sidebands:
+            return np.zeros((len(self.lines.index), self.system.size), dtype=complex)
+        counted = np.array([source in (None, name) for name in orders.source])
+        return orders.at_lines(orders.reaction * counted[:, None], self.lines, len(self.waves.base_orders), speed)
 
     @cached_property
     def _displacements(self) -> Complexes:

@@ -88,6 +88,13 @@ def is_excited(data: xr.Dataset) -> bool:
     return bool((data["amplitude"][:, 1:, 0] > LEAST_AMPLITUDE).any())
 
 
+def _in_time(data: xr.Dataset, options: str = "") -> str:
+    """Return what evaluates nonlinear models: the method `nonlinear`, which has no orders of shafts, or a run."""
+    if any(str(name).startswith("rotation of ") for name in data["base"].to_numpy()):
+        return f"exugear run{options}"
+    return f"{options} --method nonlinear".strip()
+
+
 def _rpm(speed: float) -> str:
     """Return a speed (rad/s) in three digits, without exponent."""
     return f"{float(f'{abs(speed) / RPM:.3g}'):g} rpm"
@@ -130,7 +137,7 @@ def _models(data: xr.Dataset) -> Iterator[Finding]:
     for pull in () if LAWS[model].loses_contact else pulls(data):
         text = f"{pull.mesh}: tensile mesh force at {pull.count} of {data.sizes['point']} speeds, at most "
         text += f"{100.0 * pull.share:.2g} % of the time at {_rpm(pull.speed)}; amplitudes there are invalid, because "
-        text += f"the model {model} neglects contact loss; use --mesh-model table --method nonlinear"
+        text += f"the model {model} neglects contact loss; use {_in_time(data, ' --mesh-model table')}"
         yield Finding("warning", text, pull.share)
     apart = float(np.nanmax(data["contact_loss_fraction"], initial=0.0))
     if apart > 0.0:
@@ -139,7 +146,7 @@ def _models(data: xr.Dataset) -> Iterator[Finding]:
     if names := str(data.attrs["bearings_in_time"]):
         yield Finding("note", f"nonlinear bearings (rolling elements evaluated in time): {names}")
     elif "16281" in data.attrs["bearing_laws"]:
-        text = "nonlinear bearings are linearised at the static load; --method nonlinear evaluates the nonlinear model"
+        text = f"nonlinear bearings are linearised at the static load; {_in_time(data)} evaluates the nonlinear model"
         yield Finding("note", text)
     if swings := bearing_swings(data):
         loads = [f"{own.bearing} {100.0 * own.share:.0f} % at {_rpm(own.speed)}" for own in swings[:SHOWN_BEARINGS]]
@@ -147,7 +154,7 @@ def _models(data: xr.Dataset) -> Iterator[Finding]:
         text = (
             f"dynamic load of bearings over {100.0 * STRAINED:.0f} % of their static load ({'; '.join(loads)}{more}): "
         )
-        text += 'outside the linear range, peaks there are too high; set model = "iso16281" and use --method nonlinear'
+        text += f'outside the linear range, peaks there are too high; set model = "iso16281" and use {_in_time(data)}'
         yield Finding("warning", text, swings[0].share)
     variation = float(data.attrs["stiffness_variation"])
     if variation > NOTICED_VARIATION:

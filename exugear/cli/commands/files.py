@@ -207,14 +207,14 @@ def export(
     folder has them. Use --shifts and --distances of the import.
     """
     if matrices is not None:
-        from exugear.cli.tasks.matrices import export_matrices
+        from exugear.cli.tasks.export import export_matrices
 
         if rexs is not None:
             raise BadInputError(f"--matrices {matrices}: omit {rexs}, which is for results in a REXS file")
         export_matrices(case, matrices, form, units, to, out, allow_dir, scripts, as_json, whole)
         return
     if loads is not None:
-        from exugear.cli.tasks.interface_loads import export_loads
+        from exugear.cli.tasks.export import export_loads
 
         export_loads(case, loads, speed, to, allow_dir, as_json, whole)
         return

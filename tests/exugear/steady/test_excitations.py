@@ -11,9 +11,11 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.steady.crossings import contributions
+from exugear.steady.findings import response_findings
 from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.response import signals
 from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.steady.steady_file import to_dataset, with_names
 from exugear.steady.steady_response import response_of
 from exugear.system.build import assemble
 from exugear.system.loads import LoadTable
@@ -124,3 +126,12 @@ def test_a_disabled_torque_does_not_act_and_the_nonlinear_method_is_refused():
     assert gearbox(enabled=False).torque_orders == ()
     with pytest.raises(SteadyError, match="excitations: the method nonlinear"):
         response_of(spur_assembly(), SteadySettings(SpeedRange(50.0, 150.0, 4), "nonlinear"))
+
+
+def test_a_warning_advises_no_method_that_refuses_the_file():
+    """Ninety newton metres load the bearings by more than the warning's share: the remedy is a run, not `nonlinear`."""
+    strong = spur_assembly(torque_N_m=[1.0, 90.0])
+    response = response_of(strong, SteadySettings(SpeedRange(50.0, 150.0, 12), "parametric"))
+    texts = [finding.text for finding in response_findings(with_names(to_dataset(response)))]
+    assert any("exugear run" in text for text in texts)
+    assert not any("--method nonlinear" in text for text in texts)

@@ -1,24 +1,105 @@
-"""The command `export --loads`: forces of a steady-state response on the housing, for finite-element programs."""
+"""The command `export` for other finite-element programs: matrices of a flexible body, and forces on the housing."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
-from exugear.cli.case import read_gearbox
+from exugear.cli.case import open_project, read_gearbox
 from exugear.cli.console import BadInputError
-from exugear.cli.tables import Outcome
+from exugear.cli.tables import Column, Outcome, Table
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.units import RPM
+from exugear.gearbox.variant import Variant
 from exugear.results.findings import Finding
 from exugear.results.interface_loads import interface_loads, loads_csv, nastran_loads, standing_supports
 from exugear.steady.steady_file import load_response
+from exugear.system.bearings.stiffness import elastic_names
+from exugear.system.bodies.external import interface_of
+from exugear.system.bodies.matrix_files.files import MatrixFormat, file_contents, keys_of
+from exugear.system.bodies.matrix_files.interface import UnitSystemName
 from exugear.system.bodies.of_gearbox import node_numbers
 from fe_ste.tools.files import FileError, write_file
 
+FOLDER = "matrices"
+"""Folder of the files in a results folder."""
+LEGEND = "Node: number in the files; components 1 to 3 are displacements along x, y, z, 4 to 6 rotations about them."
 SPEED_TOLERANCE = 0.01
 """Largest relative difference of a computed speed from the one that is asked for."""
+
+
+def export_matrices(
+    case: Path,
+    body: str,
+    form: MatrixFormat,
+    units: UnitSystemName,
+    to: Path | None,
+    out: Path | None,
+    allow_dir: Path | None,
+    scripts: bool,
+    as_json: bool,
+    whole: bool,
+) -> None:
+    """Write the matrices of a flexible body of the variant `flexible`."""
+    project = open_project(case, out, allow_dir, scripts, Variant.flexible)
+    flexible = elastic_names(project.gearbox)
+    if body not in flexible:
+        raise BadInputError(f"--matrices {body}: no such flexible body; flexible bodies are {', '.join(flexible)}")
+    target = to or project.folder / FOLDER
+    keys = keys_of(body, form)
+    _refuse_existing(target, keys.values())
+    project.begin()
+    reduced = project.bodies()[body].reduced
+    matrices = interface_of(reduced)
+    contents = file_contents(matrices.from_si(units), body, form)
+    for name, content in contents.items():
+        write_file(target / name, content)
+    places = (1e3 * matrices.positions).tolist()
+    seats = [
+        {"node": node, "seat": seat.name, "x_mm": x, "y_mm": y, "z_mm": z}
+        for node, seat, (x, y, z) in zip(matrices.nodes, reduced.seats, places, strict=True)
+    ]
+    Outcome(
+        verdict=f"{body}: {len(seats)} interface nodes, {len(matrices.modal)} modal coordinates, "
+        f"{reduced.rigid_inertia.mass:.5g} kg; units {units}",
+        summary={
+            "case": project.gearbox.source,
+            "body": body,
+            "format": form,
+            "units": units,
+            "files": [str(target / name) for name in contents],
+            "keys": keys,
+            "mass_kg": reduced.rigid_inertia.mass,
+            "modal_coordinates": len(matrices.modal),
+            "seats": seats,
+        },
+        tables=[
+            Table(
+                f"Interface nodes of {body}",
+                seats,
+                [
+                    Column("seat", "seat", is_text=True),
+                    Column("node", "node"),
+                    *(Column(f"{axis}\nmm", f"{axis}_mm", ".3f") for axis in "xyz"),
+                ],
+                LEGEND,
+                noun="nodes",
+            )
+        ],
+        findings=[
+            Finding(
+                "note",
+                f"modes above elasticity.limit_Hz = {project.gearbox.case.elasticity.limit_Hz:g} are at this frequency",
+            )
+        ],
+        remarks=[
+            f"As [bodies.{body}.external]: "
+            + ", ".join(f'{key} = "{value}"' for key, value in {**keys, "units": units}.items())
+        ],
+        path=target,
+    ).show(as_json, whole)
 
 
 def export_loads(
@@ -28,9 +109,7 @@ def export_loads(
     folder = to or response.parent
     stem = f"{response.stem}-loads"
     names = [f"{stem}.csv", *([] if speed is None else [f"{stem}.bdf"])]
-    existing = next((folder / name for name in names if (folder / name).exists()), None)
-    if existing is not None:
-        raise BadInputError(f"{existing}: exists already; specify another folder with --to")
+    _refuse_existing(folder, names)
     gearbox = read_gearbox(case, allow_dir, tell=not as_json)
     try:
         data = load_response(response)
@@ -66,6 +145,12 @@ def export_loads(
         ],
         path=folder / names[-1],
     ).show(as_json, whole)
+
+
+def _refuse_existing(folder: Path, names: Iterable[str]) -> None:
+    """Refuse to replace files."""
+    if existing := next((folder / name for name in names if (folder / name).exists()), None):
+        raise BadInputError(f"{existing}: exists already; specify another folder with --to")
 
 
 def _nearest(speeds: np.ndarray, speed: float) -> int:
