@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -54,8 +54,7 @@ def export_matrices(
     reduced = project.bodies()[body].reduced
     matrices = interface_of(reduced)
     contents = file_contents(matrices.from_si(units), body, form)
-    for name, content in contents.items():
-        write_file(target / name, content)
+    write_together(target, contents)
     places = (1e3 * matrices.positions).tolist()
     seats = [
         {"node": node, "seat": seat.name, "x_mm": x, "y_mm": y, "z_mm": z}
@@ -122,9 +121,8 @@ def export_loads(
         loads = list(interface_loads(gearbox, data, points, numbers))
     except ValueError as error:
         raise BadInputError(f"--loads {response}: {error}") from error
-    write_file(folder / names[0], loads_csv(loads))
-    if speed is not None:
-        write_file(folder / names[1], nastran_loads(loads[0]))
+    contents = [loads_csv(loads), *([] if speed is None else [nastran_loads(loads[0])])]
+    write_together(folder, dict(zip(names, contents, strict=True)))
     rows = [{"seat": name, "node": numbers[name]} for name in loads[0].seats]
     carrying = [body.name for body in gearbox.bodies() if body.fixed and body.wheels]
     Outcome(
@@ -145,6 +143,19 @@ def export_loads(
         ],
         path=folder / names[-1],
     ).show(as_json, whole)
+
+
+def write_together(folder: Path, contents: Mapping[str, bytes]) -> None:
+    """Write all files or none, so that the command can be called again."""
+    written = []
+    try:
+        for name, content in contents.items():
+            write_file(folder / name, content)
+            written.append(folder / name)
+    except BaseException:
+        for path in written:
+            path.unlink(missing_ok=True)
+        raise
 
 
 def _refuse_existing(folder: Path, names: Iterable[str]) -> None:

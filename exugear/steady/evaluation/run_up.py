@@ -131,6 +131,8 @@ def measurement_of(gearbox: Gearbox, name: str | None) -> tuple[str, Measurement
     if name is None and len(known) == 1:
         name = next(iter(known))
     if name is None or name not in known:
+        if not known:
+            raise gearbox.error("measurements: the file has none; add [measurements.NAME] with the file of a recording")
         wanted = "specify one of them" if name is None else f"no measurement {name!r}"
         raise gearbox.error(f"measurements: {wanted}; {known_names('measurements', known, 'measurements.NAME')}")
     return name, known[name]

@@ -13,6 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from exugear.cli.app import app
+from exugear.cli.tasks.export import write_together
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
@@ -511,3 +512,11 @@ def test_damaged_matrices_are_bad_input_of_every_command(tmp_path: Path, box: In
         assert "bodies.box.external" in out.stderr
         assert "it is truncated" in " ".join(out.stderr.split())
     assert not (tmp_path / "results").exists()
+
+
+def test_an_export_that_fails_at_its_second_file_leaves_none_behind(tmp_path: Path) -> None:
+    """A folder has the name of the second file, as any other reason for which it cannot be written."""
+    (tmp_path / "second.csv").mkdir()
+    with pytest.raises(OSError, match="second"):
+        write_together(tmp_path, {"first.csv": b"1", "second.csv": b"2"})
+    assert [path.name for path in tmp_path.iterdir()] == ["second.csv"]
