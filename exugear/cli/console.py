@@ -319,7 +319,7 @@ def _user_error(error: Exception) -> Exception | None:
     from exugear.gearbox.reading import GearboxFileError
     from exugear.gearbox.variant import VariantError
     from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
-    from exugear.steady.mean_system.rotating_frame import SteadyError
+    from exugear.steady.mean_system.planet_sets import SteadyError
     from exugear.system.bearings.rolling.rows import BearingError
     from exugear.system.statics import BalanceError
     from exugear.system.tooth_mesh.placement import MeshError

@@ -25,7 +25,7 @@ from exugear.gearbox.units import RPM
 from exugear.results.folder import modes_path, run_directory
 from exugear.results.run_file import FINAL_NAME, read_run
 from exugear.steady.mean_system.mesh_waves import wave_name
-from exugear.steady.mean_system.rotating_frame import PlanetSet, planet_sets
+from exugear.steady.mean_system.planet_sets import PlanetSet, planet_sets
 from exugear.steady.steady_file import load_response, settings_of
 from exugear.system.system import Assembly, input_hash
 from fe_ste.tools.arrays import Complexes, Floats

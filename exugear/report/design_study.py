@@ -35,7 +35,7 @@ from exugear.report.findings.proposals import ASSUMPTION, DesignChange, propose_
 from exugear.report.findings.ranking import Resonance, ranking_of
 from exugear.report.findings.words import QUANTITIES
 from exugear.results.folder import DESIGN_CHANGES_FILE, bodies_folder
-from exugear.steady.mean_system.rotating_frame import SteadyError
+from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.settings import SteadySettings
 from exugear.system.bearings.rolling.rows import BearingError
 from exugear.system.gearbox_checks import check_parts, lacking

@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from exugear.steady.mean_system.mean_system import MeanSystem, mean_modes
-from exugear.steady.mean_system.rotating_frame import PlanetSet
+from exugear.steady.mean_system.planet_sets import PlanetSet
 from exugear.system.bodies.reduction import TILT_X, TILT_Y, UX, UY
 from exugear.system.modes import BODY_MOTIONS, kinetic_shares, mode_name
 from exugear.system.statics import linearise

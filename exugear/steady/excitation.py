@@ -226,8 +226,8 @@ class HarmonicBalanceModel:
 
     @property
     def shuttles(self) -> bool:
-        """Whether the load of any mesh with a model along a row shuttles."""
-        return self.waves.shuttles and not self.loses_contact
+        """Whether any mesh with a model along a row reads its misalignment: see `MeshWaves.moving`."""
+        return bool(self.waves.moving.any()) and not self.loses_contact
 
     @property
     def is_nonlinear(self) -> bool:
@@ -352,7 +352,10 @@ class HarmonicBalanceModel:
         waves = self.waves
         lines = line_set(waves.base_orders.tolist(), reach.harmonics, reach.combinations)
         modulators = [planets for _, planets in waves.carriers]
-        lines = beside(lines, modulators, 0) if waves.passing else modulated(lines, modulators)
+        if waves.neighbours:
+            lines = beside(lines, modulators, waves.neighbours)
+        else:
+            lines = beside(lines, modulators, 0) if waves.passing else modulated(lines, modulators)
         slow = self.shaft_orders
         return with_rotations(lines, slow.rotations, slow.sidebands, len(waves.base_orders), reach.harmonics)
 
@@ -500,16 +503,34 @@ class HarmonicBalanceModel:
         if self.shuttles:
             across, _, twice = self.cycle_moments
             found[DEFLECTION, MISALIGNMENT] = found[MISALIGNMENT, DEFLECTION] = -across
-            found[MISALIGNMENT, MISALIGNMENT] = twice
+            found[MISALIGNMENT, MISALIGNMENT] = twice + _constant(twice, self.ring_tilting[:, 0])
         return found
+
+    @cached_property
+    def ring_tilting(self) -> Floats:
+        """`MeshWaves.tilting` of each wave's mesh (m, 3)."""
+        return np.asarray(self.waves.tilting[[wave.first for wave in self.waves.waves]])
+
+    @cached_property
+    def cycle_moments_given(self) -> Complexes:
+        """Fourier coefficients (m, harmonics + 1) of the moments that the meshes have without deflection, N m."""
+        pulls = self.cycle_moments[1] - self.cycle_moments_beyond
+        return np.asarray(pulls - _constant(pulls, self.ring_tilting[:, 2]))
 
     def pressed(self, static: Floats) -> Floats:
         """Deflections (m,) from where the mean stiffness has no force, at readings (m, r) of the static state, m."""
         return np.asarray(static[: len(self.waves.waves), DEFLECTION] - self.waves.rest)
 
     @cached_property
-    def _families(self) -> tuple[Family, ...]:
+    def families(self) -> tuple[Family, ...]:
+        """Families of all mesh components, in their order."""
         return families(self.waves)
+
+    @property
+    def ring(self) -> Family | None:
+        """Waves of the meshes of a flexible ring gear; None without one."""
+        rings = [own for own in self.families if own.planets is not None and own.count > own.planets.waves]
+        return rings[0] if rings else None
 
     @cached_property
     def coupling(self) -> HarmonicCoupling:
@@ -517,7 +538,7 @@ class HarmonicBalanceModel:
         forces = self._ports["forces"].shape[2]
         bases = self.lines.index.shape[1]
         return HarmonicCoupling(
-            self.lines, tuple(group_of(family, self.harmonics, forces, bases) for family in self._families)
+            self.lines, tuple(group_of(family, self.harmonics, forces, bases) for family in self.families)
         )
 
     @cached_property
@@ -532,7 +553,7 @@ class HarmonicBalanceModel:
 
     def coupled(self, spectra: Spectra, ports: MeshInterface, speed: float) -> list[Complexes]:
         """Functions of the mesh cycles, by their harmonics, as `coupling` takes them at a speed of the input."""
-        return [coupled(self.waves, family, spectra, ports, speed, ports.forces.shape[1]) for family in self._families]
+        return [coupled(self.waves, family, spectra, ports, speed, ports.forces.shape[1]) for family in self.families]
 
     @cached_property
     def lengths(self) -> Floats:
@@ -661,6 +682,13 @@ class HarmonicBalanceModel:
     def row_of_overall(self, speed: float) -> Floats:
         """Row (size,) of the overall transmission error by the frame's coordinates, m/m and m/rad."""
         return np.asarray(self.system.at(self._rows["by_place"], speed)[0])
+
+
+def _constant(cycle: Complexes, values: Floats) -> Complexes:
+    """Coefficients, like those of a function over the mesh cycle (m, h + 1), of constants (m,)."""
+    found = np.zeros_like(cycle)
+    found[:, 0] = values
+    return found
 
 
 def _stacked(ports: list[MeshInterface]) -> dict[str, Floats]:

@@ -12,7 +12,7 @@ import numpy as np
 from exugear.results.spectra.resonances import OrderCut, sweep_severity
 from exugear.results.spectra.waterfall import SAME_ORDER, OrderLine
 from exugear.steady.harmonics.branches import standing_peaks
-from exugear.steady.mean_system.rotating_frame import SteadyError
+from exugear.steady.mean_system.planet_sets import SteadyError
 from fe_ste.tools.arrays import Floats, Integers
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ Deviations of gears are a given displacement in both methods: see `exugear.stead
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -24,6 +24,7 @@ from exugear.steady.excitation import HarmonicBalanceModel, Interface
 from exugear.steady.harmonics.linear_solvers import solve_lines
 from exugear.steady.harmonics.lines import add_answered, flat
 from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, POSITION, MeshInterface, Spectra
+from exugear.steady.passing_planets import PassingPlanets
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.bundles import cached_bundle
 from fe_ste.tools.octets import SIZE
@@ -191,38 +192,87 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
     solution before (`forces_of_positions`).
     """
     shape = len(model.lines.index), *interface.ports.forces.shape[:2]
-    functions = _slopes_beyond_mean(model, interface)
     lengths = model.lengths[: shape[1], : shape[2]].ravel()
     answers = lengths[:, None] * interface.deflection_per_force
-    coupling = model.coupling
-    scaled = [
-        function / lengths[group.begin : group.begin + group.size]
-        for function, group in zip(functions, coupling.groups, strict=True)
-    ]
-    parts = *flat(scaled), *flat([answers])
-    memory = coupling.memory()
-    octets = np.empty(2 * SIZE)
-
-    def apply(readings: Complexes) -> Complexes:
-        out = np.empty_like(readings)
-        add_answered(cached_bundle(coupling.terms), *parts, readings, *memory, octets, out)
-        return out
-
-    given = given_forces(model, interface) + deviation_forces(model, interface)
     still = lengths * interface.static[..., : shape[2]].reshape(shape[0], -1)
+    repeated = bool(model.shaft_orders.sidebands) or model.ring is not None
+    balance = LineBalance(model, interface, answers)
+    given = given_forces(model, interface) + deviation_forces(model, interface)
     moved = np.zeros_like(given)
     found = None
     products = 0
-    for _ in range(1 + (POSITIONS_REPEATED if model.shaft_orders.sidebands else 0)):
+    for _ in range(1 + (POSITIONS_REPEATED if repeated else 0)):
         whole = (given + moved).reshape(shape[0], -1)
         start = still - (answers @ whole[..., None])[..., 0]
-        found, more = solve_lines(apply, start, TOLERANCE, found)
+        found, more = balance.solve(start, found)
         products += more
-        excess = (whole + coupling.of(scaled, found)).reshape(shape)
+        excess = (whole + balance.forces(found)).reshape(shape)
         response = _response(model, interface, (found / lengths).reshape(shape)[..., DEFLECTION], excess, products)
-        if model.shaft_orders.sidebands:
+        if repeated:
             moved = forces_of_positions(model, response)
+        if model.ring is not None:
+            shifted = at_mean_positions(model, interface, response)
+            balance = LineBalance(model, shifted, answers)
+            given = given_forces(model, shifted) + deviation_forces(model, shifted)
     return response
+
+
+class LineBalance:
+    """Equation y + G K y = b of all lines at one speed, with readings y (n, k) as lengths and K over the mesh cycle.
+
+    Parameters
+    ----------
+    answers : (n, k, k) readings of each line under a unit of each force, G
+    """
+
+    def __init__(self, model: HarmonicBalanceModel, interface: Interface, answers: Complexes) -> None:
+        functions = _slopes_beyond_mean(model, interface)
+        lengths = model.lengths[: interface.ports.forces.shape[0], : interface.ports.forces.shape[1]].ravel()
+        self._coupling = model.coupling
+        self._functions = [
+            function / lengths[group.begin : group.begin + group.size]
+            for function, group in zip(functions, self._coupling.groups, strict=True)
+        ]
+        self._answers = answers
+        self._parts = *flat(self._functions), *flat([answers])
+        self._memory = self._coupling.memory()
+        self._octets = np.empty(2 * SIZE)
+        self._passing = None
+        if model.ring is not None:
+            of_ring = self._functions[model.families.index(model.ring)]
+            self._passing = PassingPlanets(model, interface, of_ring, answers, lengths)
+
+    def _apply(self, readings: Complexes) -> Complexes:
+        out = np.empty_like(readings)
+        add_answered(cached_bundle(self._coupling.terms), *self._parts, readings, *self._memory, self._octets, out)
+        if self._passing is None:
+            return out
+        damped = self._passing.damper_forces(readings)
+        return self._passing.solve(out + (self._answers @ damped[..., None])[..., 0])
+
+    def forces(self, readings: Complexes) -> Complexes:
+        """Return the forces (n, k) K y."""
+        found = self._coupling.of(self._functions, readings)
+        return found if self._passing is None else found + self._passing.damper_forces(readings)
+
+    def solve(self, right: Complexes, start: Complexes | None) -> tuple[Complexes, int]:
+        """Solve for readings (n, k); the products with K that it took follow."""
+        given = right if self._passing is None else self._passing.solve(right)
+        return solve_lines(self._apply, given, TOLERANCE, start)
+
+
+def at_mean_positions(model: HarmonicBalanceModel, interface: Interface, response: Response) -> Interface:
+    """Return the meshes at the positions in their cycles that the mean of the vibration moves them to.
+
+    Passing planets wind up the gear train of the GRC by 3e-5 rad: 5e-2 rad of the fifth harmonic of its fastest mesh.
+    """
+    ports = interface.ports
+    moved = response.motion[0].real @ ports.readings[:, POSITION].T
+    means = np.array([wave.wave == 0 for wave in model.waves.waves])
+    static = ports.static.copy()
+    static[:, POSITION] += np.where(means, 0.0, moved)
+    positions = ports.positions + np.where(means, moved, 0.0)
+    return replace(interface, ports=replace(ports, positions=positions, static=static))
 
 
 def _slopes_beyond_mean(model: HarmonicBalanceModel, interface: Interface) -> list[Complexes]:
@@ -232,7 +282,10 @@ def _slopes_beyond_mean(model: HarmonicBalanceModel, interface: Interface) -> li
     for group, function in zip(model.coupling.groups, functions, strict=True):
         mean = np.flatnonzero(~group.harmonics.any(axis=1))[0]
         at = np.arange(DEFLECTION, group.size, forces)
-        function[mean, at, at] -= model.waves.mean_stiffness[(group.begin + at) // forces]
+        waves = (group.begin + at) // forces
+        function[mean, at, at] -= model.waves.mean_stiffness[waves]
+        if model.shuttles:
+            function[mean, at + MISALIGNMENT, at + MISALIGNMENT] -= model.ring_tilting[waves, 0]
     return functions
 
 
@@ -245,9 +298,11 @@ def given_forces(model: HarmonicBalanceModel, interface: Interface) -> Complexes
         return np.zeros(shape, dtype=complex)
     spectra = {(DEFLECTION, DEFLECTION): -model.cycle_pulls}
     if model.shuttles:
-        spectra[MISALIGNMENT, DEFLECTION] = model.cycle_moments[1] - model.cycle_moments_beyond
+        spectra[MISALIGNMENT, DEFLECTION] = model.cycle_moments_given
     products = _products(model, spectra, ports, interface.speed, _everywhere(model, shape))
     products[0, :, DEFLECTION] += waves.mean_stiffness * waves.rest
+    if model.shuttles:
+        products[0, :, MISALIGNMENT] += model.ring_tilting[:, 2] * [wave.wave == 0 for wave in waves.waves]
     return products
 
 

@@ -14,7 +14,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import BURSTING_RIM_SPEED, operating_range, rim_radii, summarise_loads
 from exugear.gearbox.units import RPM
 from exugear.gearbox.versions import STEADY
-from exugear.steady.mean_system.rotating_frame import SteadyError
+from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.system.system import Assembly, input_hash
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats

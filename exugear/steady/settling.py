@@ -13,7 +13,8 @@ import numpy as np
 
 from exugear.steady.harmonics.lines import LineSet
 from exugear.steady.mean_system.mean_system import MeanSystem
-from exugear.steady.mean_system.rotating_frame import PlanetSet, RotatingFrame
+from exugear.steady.mean_system.planet_sets import PlanetSet
+from exugear.steady.mean_system.rotating_frame import RotatingFrame
 from exugear.system.kernels.coordinates import TILT
 from exugear.system.loads import Drive, LoadTable
 from exugear.transient.compiled.solver import CompiledSystem, unsupported_reason
@@ -32,8 +33,7 @@ def frame_coordinates(frame: RotatingFrame, q: Floats, psi: Floats) -> Floats:
     still = np.zeros(frame.assembly.size)
     u = q - np.outer(psi, assembly.rolling_velocity(still, frame.speeds))
     bend = assembly.rolling_acceleration(still, frame.speeds, dict.fromkeys(frame.speeds, 0.0))
-    for planets in frame.sets:
-        coordinates = np.array([assembly.coordinates[name] for name in planets.names])
+    for planets, coordinates in frame.rings:
         if coordinates[0, 0] >= 0:
             _turn_back(u, q, planets, coordinates, psi, bend)
         shapes = planets.values(planets.ratio * psi)
@@ -41,6 +41,10 @@ def frame_coordinates(frame: RotatingFrame, q: Floats, psi: Floats) -> Floats:
         for axis in range(coordinates.shape[1]):
             if coordinates[0, axis] >= 0:
                 u[:, coordinates[:, axis]] = np.einsum("spw,sp->sw", back, u[:, coordinates[:, axis]])
+    for carrier in frame.carriers:
+        modal = assembly.elastic_slices[carrier.name].start + carrier.modal
+        turned = np.array([carrier.turned(float(angle))[0] for angle in psi])
+        u[:, modal] = np.linalg.solve(turned, u[:, modal, None])[..., 0]
     return u
 
 

@@ -31,7 +31,7 @@ from exugear.steady.harmonics.branches import Scales, standing_peaks, trace
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
 from exugear.steady.harmonics.lines import LineSet
 from exugear.steady.mean_system.mesh_places import DEFLECTION
-from exugear.steady.mean_system.rotating_frame import SteadyError
+from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.mean_system.signals import SignalName
 from exugear.steady.nonlinear import HarmonicResidual, Tangent, growth_of_state
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model

@@ -25,7 +25,7 @@ from exugear.results.folder import case_digest, read_content
 from exugear.results.sound.radiated_power import radiating_names
 from exugear.steady.mean_system.mean_system import mean_system
 from exugear.steady.mean_system.mesh_waves import mesh_waves
-from exugear.steady.mean_system.rotating_frame import SteadyError
+from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.mean_system.signals import SURFACE_VELOCITY, mesh_signal_names, named_amplitudes, signal_rows
 from exugear.steady.settings import SpeedRange, SteadySettings, check_law
 from exugear.studies.point_results import PointSettings, life_loads

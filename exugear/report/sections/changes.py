@@ -32,7 +32,7 @@ from exugear.report.findings.words import QUANTITIES, figure_text, rounded_text
 from exugear.report.sections.material import ChartAxis, Curve, Part, ReportData
 from exugear.report.web.html import Cell, Figure, Table, render
 from exugear.results.folder import DESIGN_CHANGES_FILE
-from exugear.steady.mean_system.rotating_frame import SteadyError
+from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.system.sensitivity import ParameterVariation
 from fe_ste.tools.files import FileError
 

@@ -19,7 +19,7 @@ from exugear.results.order_tracking.angle_cuts import BANDWIDTH, STEPS, angle_cu
 from exugear.results.spectra.waterfall import OrderLine
 from exugear.steady.evaluation.run_up import MeasuredChannel, MeasuredRunUp
 from exugear.steady.evaluation.swept import swept_cut
-from exugear.steady.mean_system.rotating_frame import SteadyError
+from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.peaks import line_name
 from exugear.steady.steady_file import complex_amplitudes
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers, SingleComplexes

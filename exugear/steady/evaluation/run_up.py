@@ -18,7 +18,7 @@ from exugear.gearbox.sections.measurements import MeasuredChannelSection, Measur
 from exugear.gearbox.units import MEASURED_UNITS, RPM, Unit, unit_of
 from exugear.results.order_tracking.angle_cuts import AngleWindow
 from exugear.results.order_tracking.shaft_angle import ShaftAngle, SpeedSignalError, angle_of_speed, angle_of_tacho
-from exugear.steady.mean_system.rotating_frame import SteadyError
+from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.settings import USUAL_COUNT, Method, SpeedRange, SteadySettings, check_speeds, usual_speeds
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.display import ReprMixin

@@ -15,10 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from exugear.steady.mean_system.mean_system import PLACE_STEP, PLACES, RATE_STEP, MeanSystem
+from exugear.steady.mean_system.mean_system import PLACE_STEP, RATE_STEP, MeanSystem
 from exugear.steady.mean_system.mesh_places import POSITION, MeshInterface, MeshPlaces, among_waves, wave_shapes
 from exugear.steady.mean_system.mesh_waves import WAVES, MeshWaves, wave_name
-from exugear.steady.mean_system.rotating_frame import PlanetSet, SteadyError
+from exugear.steady.mean_system.planet_sets import PlanetSet, SteadyError
+from exugear.steady.mean_system.rotating_frame import PLACES
 from exugear.steady.mean_system.sampled_laws import sample_rolling
 from exugear.system.bearings.stiffness import bearing_rows
 from exugear.system.kernels.connectors import rolling_pushes, rolling_strains

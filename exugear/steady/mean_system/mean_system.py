@@ -9,7 +9,6 @@ differences, since these include every element; the parabolas through three spee
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,10 +17,11 @@ from typing import Any, TypeVar
 import numpy as np
 import scipy.linalg
 
-from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Mesh
 from exugear.steady.harmonics.linear_solvers import Elimination, elimination, solve_side_by_side
-from exugear.steady.mean_system.rotating_frame import PlanetSet, RotatingFrame, SteadyError, planet_sets
+from exugear.steady.mean_system.planet_sets import PlanetSet, SteadyError, planet_sets
+from exugear.steady.mean_system.rotating_frame import RotatingFrame
+from exugear.steady.mean_system.symmetric_carriers import SymmetricCarrier, symmetric_carrier
 from exugear.system.bearings.stiffness import load_stands_still, planet_supports, with_equal_planets
 from exugear.system.modes import state_matrix
 from exugear.system.statics import RIGID_BODY_LIMIT, BalanceError, static_state
@@ -50,15 +50,6 @@ ROWS_VARIATION = 2e-2
 
 Shares rotate with the carrier's angle. In the GRC, whose sun is displaced radially, the variation is 8e-3, at three
 times the carrier's frequency: orders change by less than 1e-3, and their sidebands are neglected."""
-PLACES = 4
-"""Places of the carrier between one planet's and the next, over which matrices are averaged.
-
-A thousandth of a light resonance's amplitude hangs on it: 5e-6 of a frequency."""
-
-ELASTIC_RING = (
-    "the ring gear is flexible: stiffness varies with the carrier angle, which the steady-state response cannot "
-    "treat; set flexibility = 'none' for the ring's body"
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +75,10 @@ class MeanSystem(ReprMixin):
     planet_spread: float
     """Largest change of planet bearings' stiffness that makes them equal, over that stiffness."""
     variation: float
-    """Largest change of stiffness over the carrier's places, over the stiffness: its mean is taken."""
+    """Largest change of stiffness over the carrier's places, over the stiffness: its mean is taken. What a flexible
+    ring gear brings is left out of it: its meshes are waves around the carrier."""
+    held: tuple[Floats, Floats] | None = None
+    """(3, size, size) C and K with the carrier at zero angle; None where these are the mean ones."""
 
     def _line(self) -> str:
         return f": {self.size} coordinates, {self.speeds.min():.4g} to {self.speeds.max():.4g} rad/s"
@@ -185,7 +179,7 @@ def mean_system(assembly: Assembly, speeds: Floats) -> MeanSystem:
     _check(assembly)
     sets = planet_sets(assembly)
     assembly, spread = _with_equal_planets(assembly, sets)
-    frame = RotatingFrame(assembly, sets)
+    frame = rotating_frame(assembly, sets)
     drive, load = _drive_and_load(assembly)
     low = float(np.min(speeds))
     high = float(np.max(speeds))
@@ -194,21 +188,37 @@ def mean_system(assembly: Assembly, speeds: Floats) -> MeanSystem:
     u = _first_guess(assembly, frame, drive)
     torque = 0.0
     rows = []
+    # The static state of a gearbox with a flexible ring balances the mean over the carrier's places.
+    places = frame.places if frame.has_elastic_ring else np.zeros(1)
     matrix = None
     for speed in at:
-        u, torque = _static(frame, float(speed), drive, load, u, torque, matrix)
+        u, torque = _static(frame, places, float(speed), drive, load, u, torque, matrix)
         damping, matrix = tangents(frame, 0.0, float(speed), u)
         rows.append((u, torque, damping, matrix))
     static, torques, dampings, stiffnesses = (np.array(values) for values in zip(*rows, strict=True))
     mass = _mass(frame, 0.0, static[1])
     variation = 0.0
+    held = dampings, stiffnesses
     if sets:
         more, variation = _mean_over_places(frame, float(at[1]), static[1], (mass, dampings[1], stiffnesses[1]))
         mass = mass + more[0]
         dampings = dampings + more[1]
         stiffnesses = stiffnesses + more[2]
     pinned = assembly.spin[assembly.gearbox.case.overall.input]
-    return MeanSystem(frame, at, mass, dampings, stiffnesses, static, torques, drive, pinned, spread, variation)
+    return MeanSystem(
+        frame,
+        at,
+        mass,
+        dampings,
+        stiffnesses,
+        static,
+        torques,
+        drive,
+        pinned,
+        spread,
+        variation,
+        held if sets else None,
+    )
 
 
 def _with_equal_planets(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> tuple[Assembly, float]:
@@ -225,6 +235,35 @@ def _with_equal_planets(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> tupl
     return replace(assembly, connectors=connectors), max(spread, assembly.planet_spread)
 
 
+def rotating_frame(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> RotatingFrame:
+    """Return the rotating frame of an assembly with equal planets, its flexible carriers made symmetric.
+
+    Raises
+    ------
+    SteadyError
+        A flexible carrier is not symmetric, or has planets of different numbers.
+    """
+    carriers: dict[str, SymmetricCarrier] = {}
+    for planets in sets:
+        body = assembly.elastic_bodies.get(planets.carrier)
+        if body is None:
+            continue
+        known = carriers.get(planets.carrier)
+        if known is None:
+            axis = next(body.axis for body in assembly.bodies if body.name == planets.carrier)
+            carriers[planets.carrier] = symmetric_carrier(planets.carrier, body.reduced, planets, axis)
+        elif known.planets.waves != planets.waves:
+            raise SteadyError(
+                f"bodies.{planets.carrier}: flexible with {known.planets.waves} and {planets.waves} planets, so its "
+                "stiffness is not constant in the fixed frame; set flexibility = 'none', or use exugear run"
+            )
+    symmetric = {
+        name: replace(body, reduced=carriers[name].body) if name in carriers else body
+        for name, body in assembly.elastic_bodies.items()
+    }
+    return RotatingFrame(replace(assembly, elastic_bodies=symmetric), sets, tuple(carriers.values()))
+
+
 def unsuitable(assembly: Assembly, elastic: Collection[str] = ()) -> str:
     """Return why this package cannot compute the steady-state response of an assembly; empty if it can.
 
@@ -237,20 +276,8 @@ def unsuitable(assembly: Assembly, elastic: Collection[str] = ()) -> str:
         planet_sets(assembly)
     except SteadyError as error:
         return str(error)
-    if any(_has_sectors(assembly.gearbox, mesh) for mesh in assembly.gearbox.meshes if mesh.gear in elastic):
-        return ELASTIC_RING
-    turning = {name for body in assembly.bodies if body.carrier is not None for name in (body.name, body.carrier)}
-    return ", ".join(f"bodies.{name}: flexible and rotating with planets" for name in elastic if name in turning)
-
-
-def _has_sectors(gearbox: Gearbox, mesh: Mesh) -> bool:
-    """Whether a mesh travels around the sectors of its elastic gear."""
-    section = gearbox.case.bodies[gearbox.body(mesh.gear).family]
-    name = mesh.pair.gear.name
-    if section.external is not None:
-        return name in section.external.seats and bool(section.external.seats[name].sector_nodes)
-    seat = None if section.solid is None else section.solid.seats.get(name)
-    return seat is not None and seat.sectors is not None
+    planets = {body.name for body in assembly.bodies if body.carrier is not None}
+    return ", ".join(f"bodies.{name}: a flexible planet" for name in elastic if name in planets)
 
 
 def _check(assembly: Assembly) -> None:
@@ -263,8 +290,7 @@ def _check(assembly: Assembly) -> None:
         )
     if not gearbox.meshes:
         raise SteadyError("the gear train has no meshes and no excitation; use exugear run instead")
-    if assembly.travelling.first.size:
-        raise SteadyError(ELASTIC_RING)
+    _check_ring(assembly)
     if gearbox.pin_offsets:
         raise SteadyError(
             "pins: position errors cause unequal planet loads that rotate with the carrier, which the steady-state "
@@ -285,6 +311,32 @@ def _check(assembly: Assembly) -> None:
                 f"bearings.{support.family}.model = 'iso16281': its elements rotate with {support.on} relative to the "
                 "load, which the steady-state response cannot treat; set model = 'linear', or use exugear run"
             )
+
+
+def _check_ring(assembly: Assembly) -> None:
+    """Refuse flexible ring gears whose meshes cannot be written as waves around the carrier."""
+    travelling = [mesh for mesh in assembly.gearbox.meshes if _has_sectors(assembly, mesh)]
+    if not travelling:
+        return
+    family = assembly.gearbox.body(travelling[0].gear).family
+    remedy = f"set flexibility = 'none' for bodies.{family}, or use exugear run"
+    if not all(assembly.gearbox.body(mesh.gear).fixed for mesh in travelling):
+        raise SteadyError(
+            f"the flexible ring gear of bodies.{family} rotates, which the steady-state response cannot treat; {remedy}"
+        )
+    if len({mesh.family for mesh in travelling}) > 1:
+        raise SteadyError(f"several ring gears are flexible, but the steady-state response can treat one; {remedy}")
+    if len(travelling) % 2 == 0:
+        raise SteadyError(
+            f"bodies.{family} has a flexible ring gear with {len(travelling)} planets, but the steady-state response "
+            f"can treat an odd number of planets in a flexible ring gear; {remedy}"
+        )
+
+
+def _has_sectors(assembly: Assembly, mesh: Mesh) -> bool:
+    """Return whether a mesh travels around the sectors of its flexible gear."""
+    body = assembly.elastic_bodies.get(mesh.gear)
+    return body is not None and mesh.pair.gear.name in body.sectors
 
 
 def _drive_and_load(assembly: Assembly) -> tuple[Floats, Floats]:
@@ -364,9 +416,19 @@ def _slopes(function: Callable[[Floats], Floats], size: int, step: float) -> Flo
 
 
 def _static(
-    frame: RotatingFrame, speed: float, drive: Floats, load: Floats, u: Floats, torque: float, matrix: Floats | None
+    frame: RotatingFrame,
+    places: Floats,
+    speed: float,
+    drive: Floats,
+    load: Floats,
+    u: Floats,
+    torque: float,
+    matrix: Floats | None,
 ) -> tuple[Floats, float]:
-    """Find the static state at a speed, and the torque that keeps it; `matrix` is the stiffness at another speed."""
+    """Find the static state at a speed, and the torque that keeps it; `matrix` is the stiffness at another speed.
+
+    The mean of the forces over angles of the input (`places`, rad) is in balance.
+    """
     n = len(u)
     assembly = frame.assembly
     pinned = assembly.spin[assembly.gearbox.case.overall.input]
@@ -377,14 +439,15 @@ def _static(
     best = before = np.inf
     bordered = np.zeros((n + 1, n + 1))
     for _ in range(MOST_STEPS):
-        missing = _residual(frame, 0.0, speed, u) - load - torque * drive
+        held = np.mean([_residual(frame, float(psi), speed, u) for psi in places], axis=0)
+        missing = held - load - torque * drive
         error = float(np.abs(np.append(missing, largest * u[pinned])).max()) / largest
         if not error < np.inf or (best < BALANCED and error > 0.5 * best):
             break
         best = min(best, error)
         # The elements are all but linear: one matrix serves for several steps.
         if matrix is None or error > 0.1 * before:
-            matrix = _stiffness(frame, 0.0, speed, u)
+            matrix = np.asarray(np.mean([_stiffness(frame, float(psi), speed, u) for psi in places], axis=0))
         before = error
         bordered[:n, :n], bordered[:n, n], bordered[n, pinned] = matrix, -drive * largest, largest
         step = np.linalg.solve(bordered, -np.append(missing, largest * u[pinned]))
@@ -400,23 +463,26 @@ def _mean_over_places(
 ) -> tuple[tuple[Floats, ...], float]:
     """Means of M, C and K (size, size) over the carrier's places less those at the angle zero, which are given.
 
-    The last result is the largest change of K over the places, over K.
+    The last result is the largest change of K over the places, over K, without the meshes of a flexible ring gear.
 
     Raises
     ------
     SteadyError
         The stiffness changes as the carrier turns.
     """
-    period = max(2.0 * math.pi / abs(planets.waves * planets.ratio) for planets in frame.sets)
     more = tuple(np.zeros_like(value) for value in here)
     largest = 0.0
     curved = any(element.is_curved for element in frame.assembly.elements)
     most = ROWS_VARIATION if frame.assembly.has_rows or curved else VARIATION
-    for psi in period * np.arange(1, PLACES) / PLACES:
+    without = frame.without_elastic_ring
+    still = here[2] if without is frame else _stiffness(without, 0.0, speed, u)
+    places = frame.places
+    for psi in places[1:]:
         there = (_mass(frame, float(psi), u), *tangents(frame, float(psi), speed, u))
-        largest = max(largest, _checked_change(here[2], there[2], most))
+        turned = there[2] if without is frame else _stiffness(without, float(psi), speed, u)
+        largest = max(largest, _checked_change(still, turned, most))
         for mean, value, other in zip(more, here, there, strict=True):
-            mean += (other - value) / PLACES
+            mean += (other - value) / len(places)
     return more, largest
 
 

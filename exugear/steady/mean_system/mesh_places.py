@@ -5,7 +5,8 @@ carrier, in which the multi-blade components add up as they do for a planet ther
 Each planet out of phase is a place, whose angle rotates with the base of its carrier.
 
 A model along a row has the inputs (readings) deflection and position in the mesh cycle, and one force; its tilting
-stiffness is in the averaged system. Where its load shuttles, the misalignment is an input, too, with a moment along it.
+stiffness is in the averaged system. Where its load shuttles, or it moves around a flexible ring gear, the misalignment
+is an input, too, with a moment along it.
 The model `table` has the inputs approach of both flanks, centre distance, misalignment of both flanks and position, and
 a force along all but the last (`exugear.system.tooth_mesh.laws.table`). Kernels of `fe_ste.tools.compilation` read the
 numbers of its rows.
@@ -29,10 +30,10 @@ import numpy as np
 
 from exugear.steady.harmonics.lines import Group
 from exugear.steady.mean_system.mesh_waves import MeshWaves
-from exugear.steady.mean_system.rotating_frame import PlanetSet
+from exugear.steady.mean_system.planet_sets import PlanetSet
 from exugear.system.kernels.meshes import TILT_LEVER, TILT_REST, MeshArrays
 from exugear.system.kernels.table_law import NOMINAL_DEFLECTION, NOMINAL_DISTANCE, NOMINAL_MISALIGNMENT
-from fe_ste.tools.arrays import Complexes, Floats
+from fe_ste.tools.arrays import Booleans, Complexes, Floats
 
 TURNED = 5
 """Places around a carrier whose planets mesh in phase: exact for products of four waves."""
@@ -74,7 +75,8 @@ def mesh_places(waves: MeshWaves, speed: float, positions: Floats, angles: Float
         sense = math.copysign(1.0, speed) * wave.sense
         position = positions[first] + sense * angles[:, [wave.base]] / (2.0 * math.pi)
         column = len(waves.base_orders) + carriers.index(planets.carrier) if planets and wave.ahead else None
-        shapes = wave_shapes(planets, speed, None if column is None else angles[:, column])
+        number = sum(other.first == wave.first for other in waves.waves)
+        shapes = wave_shapes(planets, speed, None if column is None else angles[:, column], number)
         rows, columns = among_waves(shapes, first, count, (len(angles),) if turning else ())
         there.append(rows)
         back.append(columns)
@@ -85,7 +87,7 @@ def mesh_places(waves: MeshWaves, speed: float, positions: Floats, angles: Float
     )
 
 
-def wave_shapes(planets: PlanetSet | None, speed: float, turned: Floats | None) -> Floats:
+def wave_shapes(planets: PlanetSet | None, speed: float, turned: Floats | None, count: int | None = None) -> Floats:
     """Waves in the places (places, waves), or where the carrier is turned by angles (s, places, waves).
 
     Parameters
@@ -93,11 +95,12 @@ def wave_shapes(planets: PlanetSet | None, speed: float, turned: Floats | None) 
     planets : None of what does not travel
     speed : of the input, rad/s
     turned : (s,) angles of the base of the carrier, rad; None where it is none
+    count : of waves where planets are modelled one by one; by default as many as planets
     """
     if planets is None:
         return np.ones((1, 1))
     if turned is not None:
-        return planets.values(math.copysign(1.0, speed * planets.ratio) * turned)
+        return planets.values(math.copysign(1.0, speed * planets.ratio) * turned, count)
     theta = 2.0 * np.pi * np.arange(TURNED) / TURNED
     return np.stack([np.ones_like(theta), np.cos(theta), np.sin(theta)], axis=1)
 
@@ -148,7 +151,7 @@ class MeshInterface:
 def mesh_ports(waves: MeshWaves, speed: float, loses_contact: bool) -> MeshInterface:
     """Rows of all mesh components at a speed of the input (rad/s); `loses_contact` for the model `table`."""
     meshes = waves.assembly.meshes
-    rows, offsets = _table_rows(meshes) if loses_contact else _row_rows(meshes, waves.shuttles)
+    rows, offsets = _table_rows(meshes) if loses_contact else _row_rows(meshes, waves.moving)
     means = np.array([wave.wave == 0 for wave in waves.waves])
     firsts = [wave.first for wave in waves.waves]
     readings = [waves.gradients(row, speed) for row in rows] + [waves.position_rows()]
@@ -168,22 +171,21 @@ def mesh_ports(waves: MeshWaves, speed: float, loses_contact: bool) -> MeshInter
     )
 
 
-def _row_rows(meshes: MeshArrays, shuttles: bool) -> tuple[list[Floats], list[Floats]]:
+def _row_rows(meshes: MeshArrays, moving: Booleans) -> tuple[list[Floats], list[Floats]]:
     """Return the input rows of a model along a row (`system.tooth_mesh.contact_state`), and values at zero coordinates.
 
-    These are its deflection with the mean lever arm of the load and, where loads shuttle, the misalignment relative to
-    that of the contact's state; zeros for a mesh without shuttling.
+    These are its deflection with the mean lever arm of the load and, for `MeshWaves.moving`, the misalignment relative
+    to that of the contact's state; zeros for other meshes.
     """
     lever = meshes.tilt[:, TILT_LEVER]
     nominal = meshes.table.nominal
     turned = nominal[:, NOMINAL_MISALIGNMENT] - meshes.tilt[:, TILT_REST]
     row = meshes.deflection - lever[:, None] * meshes.table.misalignment
     offset = lever * turned
-    if not shuttles:
+    if not moving.any():
         return [row], [nominal[:, NOMINAL_DEFLECTION] - offset]
-    moves = meshes.way_pieces > 0
-    rows = [row, moves[:, None] * meshes.table.misalignment]
-    return rows, [nominal[:, NOMINAL_DEFLECTION] - offset, moves * turned]
+    rows = [row, moving[:, None] * meshes.table.misalignment]
+    return rows, [nominal[:, NOMINAL_DEFLECTION] - offset, moving * turned]
 
 
 def _table_rows(meshes: MeshArrays) -> tuple[list[Floats], list[Floats]]:
@@ -227,7 +229,7 @@ class Family:
         """Largest multiple of the carrier's angle in products of two shapes."""
         if self.carrier < 0 or self.planets is None:
             return 0
-        return 2 * (self.planets.waves // 2)
+        return 2 * (self.count // 2)
 
 
 def families(waves: MeshWaves) -> tuple[Family, ...]:
@@ -290,9 +292,11 @@ def _place_coefficients(family: Family, cycles: Complexes, ports: MeshInterface,
     """Coefficients (f, h + 1, turns, waves, waves) by all places, each as far ahead as the static state has it."""
     samples = SAMPLED * family.turns if family.carrier >= 0 else 1
     theta = 2.0 * math.pi * np.arange(samples) / samples
-    there = wave_shapes(family.planets, speed, theta if family.carrier >= 0 else None)
+    there = wave_shapes(family.planets, speed, theta if family.carrier >= 0 else None, family.count)
     there = np.broadcast_to(there, (samples, *there.shape[-2:]))
-    back = np.swapaxes(there / (there**2).sum(axis=-2, keepdims=True), -1, -2)
+    one_by_one = family.planets is not None and family.carrier >= 0
+    norms = family.planets.norms(family.count) if one_by_one else (there**2).sum(axis=-2, keepdims=True)
+    back = np.swapaxes(there / norms, -1, -2)
     ahead = ports.positions[family.first] + np.array(family.ahead) + there @ ports.static[family.waves, POSITION]
     turned = np.exp(2j * math.pi * np.arange(cycles.shape[1])[:, None, None] * ahead)
     between = (back * turned[:, :, None, :]) @ there

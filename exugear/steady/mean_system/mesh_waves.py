@@ -14,6 +14,7 @@ another, and its order to a sideband, by a whole number of the carrier's revolut
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -22,12 +23,22 @@ import numpy as np
 
 from exugear.steady.harmonics.lines import Modulator, fourier_coefficients
 from exugear.steady.mean_system.mean_system import MeanSystem
-from exugear.steady.mean_system.rotating_frame import PlanetSet, RotatingFrame
+from exugear.steady.mean_system.planet_sets import PlanetSet
+from exugear.steady.mean_system.rotating_frame import RotatingFrame
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
-from exugear.system.kernels.meshes import FRAME, MOMENT_BEYOND, ROW_SIZE, frame_row
+from exugear.system.kernels.meshes import (
+    FRAME,
+    MOMENT_BEYOND,
+    ROW_SIZE,
+    TILT_DAMPING,
+    TILT_MOMENT,
+    TILT_STIFFNESS,
+    frame_row,
+)
+from exugear.system.kernels.turning import travelling_tangent
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.line_of_action import CURVE_FORM, EXPONENT
-from fe_ste.tools.arrays import Complexes, Floats
+from fe_ste.tools.arrays import Booleans, Complexes, Floats
 
 SAMPLES = 64
 """Samples of each cubic piece of a stiffness for its Fourier coefficients: aliases are below 1e-7 of it."""
@@ -38,6 +49,10 @@ MAX_NEGLECTED = 2e-2
 
 With it the ten highest peaks of the GRC and of a spur planetary gearbox agree within 1e-2 with results for 1.5 times as
 many harmonics."""
+NEIGHBOURS = 4
+"""Multiples of the planet passing frequency by which a flexible ring gear couples each order to others.
+
+With four, main orders of the GRC are within 1e-3 of those with twelve at most speeds."""
 CONSTANT = 1e-9
 """Variation of a compliance over its mean below which there is none."""
 IN_PHASE = 1e-6
@@ -104,6 +119,8 @@ class MeshWaves:
     """Multiples of the planet passing frequency (three times per revolution of the carrier for three planets) whose
     orders are included: planets in phase are then modelled individually as they rotate, like planets out of phase, and
     not by their mean."""
+    neighbours: int = 0
+    """Multiples of that frequency on either side of each order that a flexible ring gear couples it to."""
 
     @property
     def assembly(self) -> Assembly:
@@ -181,15 +198,18 @@ class MeshWaves:
     def gradients(self, rows: Floats, speed: float) -> Floats:
         """Waves (m, size) of the gradients of rows (meshes, 12) by the frame's coordinates, at a speed (rad/s)."""
         frame = self.system.frame
-        q, _, _ = frame.state(0.0, speed, self.system.static_at(speed))
-        found = np.array([_row(self.assembly, m, q, row)[1] for m, row in enumerate(rows)])
-        return self._waves_of(found @ frame.matrices(0.0)[0])
+        u = self.system.static_at(speed)
+
+        def at(psi: float) -> Floats:
+            return _rows(self.assembly, frame.state(psi, speed, u)[0], rows)[1] @ frame.matrices(psi)[0]
+
+        return self._waves_of(at)
 
     def values(self, rows: Floats, speed: float) -> Floats:
         """Waves (m,) of the values of rows (meshes, 12) in the static state at a speed (rad/s)."""
         frame = self.system.frame
-        q, _, _ = frame.state(0.0, speed, self.system.static_at(speed))
-        return self._waves_of(np.array([_row(self.assembly, m, q, row)[0] for m, row in enumerate(rows)]))
+        u = self.system.static_at(speed)
+        return self._waves_of(lambda psi: _rows(self.assembly, frame.state(psi, speed, u)[0], rows)[0])
 
     def position_rows(self) -> Floats:
         """Rows of the position in the mesh cycle by the frame's coordinates, (m, size), cycles."""
@@ -199,7 +219,7 @@ class MeshWaves:
             for at, sign in ((SPIN, 1.0), (FRAME, -1.0)):
                 if index[at] >= 0:
                     gradients[m, index[at]] += sign * assembly.meshes.cycles[m]
-        return self._waves_of(gradients @ self.system.frame.matrices(0.0)[0])
+        return self._waves_of(lambda psi: gradients @ self.system.frame.matrices(psi)[0])
 
     def positions(self, speed: float) -> Floats:
         """Position in the mesh cycle of each wave's mesh at zero angle of the input, (m,), cycles."""
@@ -208,10 +228,23 @@ class MeshWaves:
         mean = {wave.family: float(moved[n]) for n, wave in enumerate(self.waves) if wave.wave == 0}
         return np.asarray(phases + np.array([mean[wave.family] for wave in self.waves]))
 
+    @cached_property
+    def tilting(self) -> Floats:
+        """Resistance of the meshes (meshes, 3) of a flexible ring gear to misalignment, 0 for others.
+
+        Stiffness (N m/rad), damping (N m s/rad) and constant moment (N m), as in `MeshArrays.tilt`.
+        """
+        meshes = self.assembly.meshes
+        of_ring = [self.system.frame.ring_waves(m) > 0 for m in range(len(meshes.tilt))]
+        return meshes.tilt[:, [TILT_STIFFNESS, TILT_DAMPING, TILT_MOMENT]] * np.array(of_ring)[:, None]
+
     @property
-    def shuttles(self) -> bool:
-        """Whether the load of any mesh shuttles over its cycle."""
-        return bool(self.assembly.meshes.way_pieces.any())
+    def moving(self) -> Booleans:
+        """Meshes (meshes,) whose moment over misalignment is not all in the averaged system.
+
+        Their load shuttles over the cycle, or they move around a flexible ring gear.
+        """
+        return np.asarray((self.assembly.meshes.way_pieces > 0) | self.tilting.any(axis=1))
 
     def cycle_coefficients(self, *quantities: CycleQuantity, harmonics: int) -> Complexes:
         """Fourier coefficients (m, harmonics + 1) of the product of quantities over the mesh cycle."""
@@ -253,7 +286,7 @@ class MeshWaves:
     @property
     def varies(self) -> bool:
         """Whether the compliance of any mesh or its load's place changes over the cycle: else nothing excites."""
-        return self.shuttles or any(bool(tails[0]) for tails in self._tails.values())
+        return bool(self.moving.any()) or any(bool(tails[0]) for tails in self._tails.values())
 
     def needed_harmonics(self) -> int:
         """Count the harmonics of each mesh frequency that the compliance asks for.
@@ -280,8 +313,18 @@ class MeshWaves:
             found[mesh] = np.append(above / above[0], np.zeros(MOST_HARMONICS)) if varies else np.zeros(MOST_HARMONICS)
         return found
 
-    def _waves_of(self, values: Floats) -> Floats:
-        """Waves (m, ...) of values (meshes, ...) at zero angle of the input."""
+    def _waves_of(self, at: Callable[[float], Floats]) -> Floats:
+        """Waves (m, ...) of values (meshes, ...), which are a function of the angle of the input, rad.
+
+        Without a flexible ring gear waves are the same at all angles. With one they are a Fourier series around the
+        carrier, from values at places around it.
+        """
+        frame = self.system.frame
+        places = frame.places if frame.has_elastic_ring else np.zeros(1)
+        return np.asarray(np.mean([self._projected(at(float(psi)), float(psi)) for psi in places], axis=0))
+
+    def _projected(self, values: Floats, psi: float) -> Floats:
+        """Waves (m, ...) of values (meshes, ...) at an angle of the input, rad."""
         out: Floats = np.empty((len(self.waves), *values.shape[1:]))
         at = 0
         for meshes, planets in self.groups:
@@ -291,22 +334,24 @@ class MeshWaves:
                 at += 1
                 continue
             count = sum(self.planets(wave) is planets and wave.first == meshes[0] for wave in self.waves)
-            shapes = planets.shapes(0.0)[0][:, :count]
-            norms = (shapes**2).sum(axis=0)
-            out[at : at + count] = np.tensordot(shapes / norms, value, axes=(0, 0))
+            shapes = planets.values(np.array(planets.ratio * psi), max(count, planets.waves))[:, :count]
+            out[at : at + count] = np.tensordot(shapes / planets.norms(count), value, axes=(0, 0))
             at += count
         return out
 
 
-def mesh_waves(system: MeanSystem, passing: int = 0) -> MeshWaves:
-    """Mesh components of an averaged system; `passing` as in `MeshWaves`."""
-    assembly = system.frame.assembly
+def mesh_waves(system: MeanSystem, passing: int = 0, neighbours: int = NEIGHBOURS) -> MeshWaves:
+    """Mesh components of an averaged system; `passing` and, of a flexible ring gear, `neighbours` as in `MeshWaves`."""
+    frame = system.frame
+    assembly = frame.assembly
     gearbox = assembly.gearbox
     frequencies = gearbox.train.mesh_frequencies(2.0 * math.pi)
     orders: list[float] = []
     names: list[list[str]] = []
     waves: list[MeshWave] = []
-    for meshes, planets in _groups(system.frame):
+    groups = _groups(frame)
+    rings = [planets for meshes, planets in groups if planets is not None and frame.ring_waves(meshes[0])]
+    for meshes, planets in groups:
         mesh = assembly.elements[meshes[0]].mesh
         order = frequencies[mesh.name]
         base = next((n for n, known in enumerate(orders) if abs(order - known) < SAME_BASE * known), len(orders))
@@ -314,18 +359,25 @@ def mesh_waves(system: MeanSystem, passing: int = 0) -> MeshWaves:
             orders.append(order)
             names.append([])
         names[base].append(mesh.family)
-        sense = math.copysign(1.0, _cycles_per_turn(system.frame, meshes[0]))
+        sense = math.copysign(1.0, _cycles_per_turn(frame, meshes[0]))
         own = (meshes[0],)
         if planets is None:
             waves.append(MeshWave(mesh.name, mesh.name, *own, 0, 1.0, base, sense, 0.0))
             continue
-        ahead = _phases_ahead(assembly, meshes) or (0.0,) * (len(meshes) if passing else 0)
-        norms = (planets.shapes(0.0)[0] ** 2).sum(axis=0)
-        for number in range(planets.waves if ahead else len(WAVES)):
+        one_by_one = passing or any(planets is own for own in rings)
+        ahead = _phases_ahead(assembly, meshes) or (0.0,) * (len(meshes) if one_by_one else 0)
+        count = max(planets.waves if ahead else len(WAVES), 2 * frame.ring_waves(meshes[0]) + 1)
+        for number, weight in enumerate(planets.norms(max(count, planets.waves))[:count]):
             label = f"{mesh.family} {wave_name(number, planets.waves)}" if number else mesh.family
-            weight = float(norms[number])
-            waves.append(MeshWave(label, mesh.family, *own, number, weight, base, sense, planets.ratio, ahead))
-    return MeshWaves(system, tuple(waves), np.array(orders), tuple(", ".join(name) for name in names), passing)
+            waves.append(MeshWave(label, mesh.family, *own, number, float(weight), base, sense, planets.ratio, ahead))
+    return MeshWaves(
+        system,
+        tuple(waves),
+        np.array(orders),
+        tuple(", ".join(name) for name in names),
+        passing,
+        neighbours if rings else 0,
+    )
 
 
 def _groups(frame: RotatingFrame) -> tuple[tuple[tuple[int, ...], PlanetSet | None], ...]:
@@ -387,15 +439,21 @@ def _one_of(steps: set[int | None]) -> tuple[int | None]:
     return (next(iter(steps)),) if len(steps) == 1 else (None,)
 
 
-def _row(assembly: Assembly, mesh: int, q: Floats, row: Floats) -> tuple[float, Floats]:
-    """Value of a row (12,) of a mesh, and its gradient (size,) by the coordinates."""
+def _rows(assembly: Assembly, q: Floats, rows: Floats) -> tuple[Floats, Floats]:
+    """Values (meshes,) of rows (meshes, 12), and their gradients (meshes, size) by the coordinates q."""
     meshes = assembly.meshes
-    index = meshes.coordinates[mesh]
-    out = np.zeros(assembly.size)
+    still = np.zeros_like(q)
+    x, u = assembly.with_travelling(q, still)
+    values = np.empty(len(rows))
+    gradients = np.zeros((len(rows), len(x)))
     local = np.empty(ROW_SIZE)
     turning = np.empty(ROW_SIZE)
-    value = frame_row(q, index, meshes.axis[mesh], row, local, turning)
-    for at in range(2 * BODY_SIZE + 1):
-        if index[at] >= 0:
-            out[index[at]] += local[at]
-    return float(value), out
+    for m, row in enumerate(rows):
+        index = meshes.coordinates[m]
+        values[m] = frame_row(x, index, meshes.axis[m], row, local, turning)
+        for at in range(2 * BODY_SIZE + 1):
+            if index[at] >= 0:
+                gradients[m, index[at]] += local[at]
+    if assembly.travelling.first.size:
+        gradients = gradients @ travelling_tangent(x, u, np.zeros_like(x), assembly.travelling).place
+    return values, gradients

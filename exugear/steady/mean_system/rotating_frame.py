@@ -6,124 +6,30 @@ then as components around the carrier: with N planets at angles theta_n = psi + 
     z_n = z_0 + sum_m (z_cm cos m theta_n + z_sm sin m theta_n) [+ z_a (-1)^n for even N].
 
 The components do not rotate with the carrier: a central body on anisotropic bearings has constant stiffness (Coleman
-and Feingold 1958, NACA report 1351). Bodies on fixed axes keep their coordinates.
+and Feingold 1958, NACA report 1351). The seats of a flexible carrier that its planets sit on have the same components,
+and its modal coordinates those of their wave numbers. Bodies on fixed axes keep their coordinates.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TypeAlias
 
 import numpy as np
 
-from exugear.gearbox.parts import Body
-from exugear.system.bearings.stiffness import FEWEST, equally_spaced, planet_families
+from exugear.steady.mean_system.planet_sets import Jet, PlanetSet
+from exugear.steady.mean_system.symmetric_carriers import SymmetricCarrier
 from exugear.system.kernels.coordinates import TILT
 from exugear.system.kernels.meshes import MeshArrays
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats, Integers
 
-Jet: TypeAlias = tuple[Floats, Floats, Floats]
-"""A function of the input's angle with two derivatives by it."""
+PLACES = 4
+"""Places of the carrier between one planet's and the next, over which matrices are averaged, at least.
 
-
-class SteadyError(ValueError):
-    """A gearbox, or a wish, that the steady response cannot treat; the message says why."""
-
-
-@dataclass(frozen=True)
-class PlanetSet:
-    """Equal, equally spaced planets of one carrier."""
-
-    names: tuple[str, ...]
-    """In the order of their angles."""
-    carrier: str
-    angles: Floats
-    """(N,) at zero angle of the carrier, rad."""
-    ratio: float
-    """Angle of the carrier over that of the overall input."""
-
-    @property
-    def waves(self) -> int:
-        """Number of planets, which is that of waves."""
-        return len(self.names)
-
-    def values(self, turned: Floats) -> Floats:
-        """Waves at the planets (..., planets, waves) where the carrier has turned by angles (...), rad."""
-        theta = turned[..., None] + self.angles
-        found = [np.ones_like(theta)]
-        for m in range(1, (self.waves - 1) // 2 + 1):
-            found += [np.cos(m * theta), np.sin(m * theta)]
-        if self.waves % 2 == 0:
-            found.append(np.broadcast_to(np.where(np.arange(self.waves) % 2, -1.0, 1.0), theta.shape))
-        return np.stack(found, axis=-1)
-
-    def shapes(self, psi: float) -> Jet:
-        """Waves at the planets (planets, waves), and two derivatives by the input's angle psi (rad).
-
-        The first three are the mean, the cosine and the sine.
-        """
-        theta = self.ratio * psi + self.angles
-        rate = self.ratio
-        value = [np.ones_like(theta)]
-        slope = [np.zeros_like(theta)]
-        bend = [np.zeros_like(theta)]
-        for m in range(1, (self.waves - 1) // 2 + 1):
-            c = np.cos(m * theta)
-            s = np.sin(m * theta)
-            value += [c, s]
-            slope += [-m * rate * s, m * rate * c]
-            bend += [-((m * rate) ** 2) * c, -((m * rate) ** 2) * s]
-        if self.waves % 2 == 0:
-            value.append(np.where(np.arange(self.waves) % 2, -1.0, 1.0))
-            slope.append(np.zeros_like(theta))
-            bend.append(np.zeros_like(theta))
-        return np.array(value).T, np.array(slope).T, np.array(bend).T
-
-
-def planet_sets(assembly: Assembly) -> tuple[PlanetSet, ...]:
-    """Planet sets of a gearbox, checked.
-
-    Raises
-    ------
-    SteadyError
-        Two planets, planets that are not equally spaced, or an elastic carrier or planet.
-    """
-    gearbox = assembly.gearbox
-    bodies = {body.name: body for body in assembly.bodies}
-    speeds = gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
-    sets = []
-    for planets in planet_families(assembly.bodies):
-        carrier = str(planets[0].carrier)
-        family = planets[0].family
-        elastic = [name for name in (carrier, *(p.name for p in planets)) if name in assembly.elastic_bodies]
-        if elastic:
-            raise SteadyError(
-                f"bodies.{elastic[0]}: flexible and rotating with planets, so its stiffness is not constant in the "
-                "fixed frame; set flexibility = 'none' for the steady-state response"
-            )
-        _check_spacing(family, planets)
-        names = tuple(planet.name for planet in planets)
-        angles = np.array([planet.orbit_angle for planet in planets])
-        sets.append(PlanetSet(names, bodies[carrier].name, angles, speeds[carrier]))
-    return tuple(sets)
-
-
-def _check_spacing(family: str, planets: Sequence[Body]) -> None:
-    if len(planets) < FEWEST:
-        raise SteadyError(
-            f"bodies.{family}: {len(planets)} planets; with fewer than {FEWEST} equally spaced planets the matrices "
-            "vary with the carrier angle, which the steady-state response cannot treat; use exugear run instead"
-        )
-    if not equally_spaced(planets):
-        raise SteadyError(
-            f"bodies.{family}.planet_angles_deg: with unequally spaced planets the matrices vary with the carrier "
-            "angle, which the steady-state response cannot treat; use exugear run instead"
-        )
+A thousandth of a light resonance's amplitude hangs on it: 5e-6 of a frequency."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +38,10 @@ class RotatingFrame:
 
     assembly: Assembly
     sets: tuple[PlanetSet, ...]
+    carriers: tuple[SymmetricCarrier, ...] = ()
+    """Flexible carriers, which the assembly has in this symmetric form."""
+    ring_meshes: bool = True
+    """Whether the meshes of a flexible ring gear have forces."""
 
     @cached_property
     def mean_meshes(self) -> MeshArrays:
@@ -141,10 +51,19 @@ class RotatingFrame:
         would depend on each planet's misalignment and load.
         """
         if not LAWS[self.assembly.mesh_model].loses_contact:
-            return self.assembly.tangent_meshes
-        teeth = self.assembly.linear_meshes()
-        # What tables resist misalignment with is in the forces that they have beyond this.
-        return teeth._replace(tilt=np.zeros_like(teeth.tilt))
+            meshes = self.assembly.tangent_meshes
+        else:
+            meshes = self.assembly.linear_meshes()
+            # What tables resist misalignment with is in the forces that they have beyond this.
+            meshes = meshes._replace(tilt=np.zeros_like(meshes.tilt))
+        if self.ring_meshes:
+            return meshes
+        kept = np.array([self.ring_waves(m) == 0 for m in range(len(meshes.damping))])
+        return meshes._replace(
+            stiffness=meshes.stiffness * kept[:, None, None],
+            damping=meshes.damping * kept,
+            tilt=meshes.tilt * kept[:, None],
+        )
 
     @cached_property
     def speeds(self) -> dict[str, float]:
@@ -153,10 +72,52 @@ class RotatingFrame:
         return gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
 
     @cached_property
-    def _planet_coordinates(self) -> tuple[tuple[PlanetSet, Integers], ...]:
-        """Coordinates (planets, 6) of each set, -1 where there is none."""
+    def rings(self) -> tuple[tuple[PlanetSet, Integers], ...]:
+        """Coordinates (planets, 6) of what rotates with carriers, planet by planet, -1 where there is none.
+
+        These are the planets of each set and the seats of flexible carriers off their axes.
+        """
         coordinates = self.assembly.coordinates
-        return tuple((planets, np.array([coordinates[name] for name in planets.names])) for planets in self.sets)
+        found = [(planets, np.array([coordinates[name] for name in planets.names])) for planets in self.sets]
+        for carrier in self.carriers:
+            first = self.assembly.elastic_slices[carrier.name].start
+            found += [(carrier.planets, first + ring) for ring in carrier.rings]
+        return tuple(found)
+
+    @property
+    def has_elastic_ring(self) -> bool:
+        """Whether planets mesh with a flexible ring gear, so that stiffness varies as they pass."""
+        return bool(self.assembly.travelling.first.size)
+
+    def ring_waves(self, mesh: int) -> int:
+        """Highest wave number around the carrier that the deflection of a mesh has by a flexible ring gear; 0 of none.
+
+        The motion of a ring of s sectors is a polynomial of order (s - 1) / 2 (`exugear.system.kernels.turning`).
+        """
+        gear = self.assembly.elements[mesh].mesh
+        body = self.assembly.elastic_bodies.get(gear.gear)
+        return 0 if body is None else (len(body.sectors.get(gear.pair.gear.name, ())) - 1) // 2
+
+    @cached_property
+    def places(self) -> Floats:
+        """Angles of the input (p,), rad, at which carriers are evenly spread from one planet's place to the next.
+
+        Over them and all planets products of two waves around a flexible ring gear have their exact mean.
+        """
+        count = PLACES
+        for m, element in enumerate(self.assembly.elements):
+            for planets in self.sets:
+                if element.mesh.pinion in planets.names:
+                    count = max(count, 2 * self.ring_waves(m) // planets.waves + 1)
+        passage = max(2.0 * math.pi / abs(planets.waves * planets.ratio) for planets in self.sets)
+        return np.asarray(passage * np.arange(count) / count)
+
+    @cached_property
+    def without_elastic_ring(self) -> RotatingFrame:
+        """The same gearbox without the forces of the meshes of a flexible ring gear; itself if it has none."""
+        if not self.has_elastic_ring:
+            return self
+        return replace(self, ring_meshes=False)
 
     def _unit(self) -> Jet:
         size = self.assembly.size
@@ -185,17 +146,21 @@ class RotatingFrame:
 
     def _matrices(self, psi: float) -> Jet:
         turned = self._unit()
-        for planets, coordinates in self._planet_coordinates:
+        for planets, coordinates in self.rings:
             waves = planets.shapes(psi)
             for axis in range(coordinates.shape[1]):
                 if coordinates[0, axis] >= 0:
                     place = np.ix_(coordinates[:, axis], coordinates[:, axis])
                     for matrix, values in zip(turned, waves, strict=True):
                         matrix[place] = values
-        for planets, coordinates in self._planet_coordinates:
+        for planets, coordinates in self.rings:
             if coordinates[0, 0] < 0:
                 continue
             turned = self._with_directions(planets, coordinates, psi, turned)
+        for carrier in self.carriers:
+            modal = self.assembly.elastic_slices[carrier.name].start + carrier.modal
+            for matrix, values in zip(turned, carrier.turned(psi), strict=True):
+                matrix[np.ix_(modal, modal)] = values
         return turned
 
     def _with_directions(self, planets: PlanetSet, coordinates: Integers, psi: float, waves: Jet) -> Jet:
@@ -220,7 +185,7 @@ class RotatingFrame:
         place = psi * assembly.rolling_velocity(still, self.speeds)
         rate = assembly.rolling_velocity(still, self.speeds)
         bend = assembly.rolling_acceleration(still, self.speeds, dict.fromkeys(self.speeds, 0.0))
-        for planets, coordinates in self._planet_coordinates:
+        for planets, coordinates in self.rings:
             if coordinates[0, 0] < 0:
                 continue
             angle = planets.ratio * psi

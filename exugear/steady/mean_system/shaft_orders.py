@@ -24,7 +24,7 @@ import numpy as np
 from exugear.gearbox.parts import TorqueOrder
 from exugear.steady.harmonics.lines import SAME, LineSet, Rotation, Sidebands, fourier_coefficients, largest
 from exugear.steady.mean_system.mesh_waves import MeshWaves
-from exugear.steady.mean_system.rotating_frame import PlanetSet
+from exugear.steady.mean_system.planet_sets import PlanetSet
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.system.kernels.meshes import FRAME
 from exugear.system.system import Assembly

@@ -15,7 +15,7 @@ import numpy as np
 
 from exugear.steady.mean_system.mean_system import MeanSystem, place_step
 from exugear.steady.mean_system.mesh_waves import MeshWaves, wave_name
-from exugear.steady.mean_system.rotating_frame import PlanetSet
+from exugear.steady.mean_system.planet_sets import PlanetSet
 from exugear.system.kernels.coordinates import TILT
 from exugear.system.modes import overall_row
 from exugear.system.system import Assembly

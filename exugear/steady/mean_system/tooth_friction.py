@@ -15,7 +15,7 @@ import numpy as np
 from exugear.steady.harmonics.lines import HarmonicCoupling, LineSet, fourier_coefficients
 from exugear.steady.mean_system.mesh_places import MeshInterface, coupled, families, group_of
 from exugear.steady.mean_system.mesh_waves import MeshWaves
-from exugear.steady.mean_system.rotating_frame import SteadyError
+from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.system.tooth_mesh.element import friction_lack
 from exugear.system.tooth_mesh.laws.friction import FRICTION_PARTS
 from fe_ste.tools.arrays import Complexes

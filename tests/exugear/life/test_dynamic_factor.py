@@ -15,7 +15,7 @@ from exugear.gearbox.units import RPM
 from exugear.life.dynamic_factors import DynamicFactor, factors, family_factors, response_path, window_factors
 from exugear.life.life import rating_of
 from exugear.project import Project
-from exugear.steady.mean_system.rotating_frame import PlanetSet
+from exugear.steady.mean_system.planet_sets import PlanetSet
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import stored_or_computed
 from exugear.system.build import assemble

@@ -9,7 +9,7 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.steady.mean_system.rotating_frame import SteadyError
+from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.peaks import line_name
 from exugear.steady.response import dissipated_and_given, signals
 from exugear.steady.settings import SpeedRange, SteadySettings

@@ -11,7 +11,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.templates.kinds import template
 from exugear.gearbox.units import RPM
 from exugear.steady.harmonics.branches import standing_peaks
-from exugear.steady.mean_system.rotating_frame import SteadyError
+from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.mean_system.signals import quantities_of
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.response import signals

@@ -11,7 +11,7 @@ import xarray as xr
 from exugear.gearbox.choice import Choice
 from exugear.results.spectra.resonances import OrderCut, sweep_severity
 from exugear.results.spectra.waterfall import OrderLine
-from exugear.steady.mean_system.rotating_frame import SteadyError
+from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.peaks import compared_peaks, damping_at, peaks
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import to_dataset

@@ -9,7 +9,7 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.steady.campbell import campbell_from
-from exugear.steady.mean_system.rotating_frame import SteadyError
+from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.peaks import line_name, peaks, planet_sidebands, sidebands
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import load_response, partial_path, stored_or_computed

@@ -13,7 +13,7 @@ import xarray as xr
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
-from exugear.steady.mean_system.rotating_frame import SteadyError
+from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.mean_system.tooth_friction import tooth_friction
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import steady_response

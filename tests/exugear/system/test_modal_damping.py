@@ -13,7 +13,8 @@ from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.variant import VariantError
 from exugear.results.run_file import load_run
 from exugear.steady.mean_system.mean_system import mean_modes, mean_system
-from exugear.steady.mean_system.rotating_frame import RotatingFrame, planet_sets
+from exugear.steady.mean_system.planet_sets import planet_sets
+from exugear.steady.mean_system.rotating_frame import RotatingFrame
 from exugear.system.build import assemble
 from exugear.system.kernels.modal_damping import ModalArrays, modal_matrix, turn_planets
 from exugear.system.kernels.products import symmetric_tiles

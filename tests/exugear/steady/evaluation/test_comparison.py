@@ -20,7 +20,7 @@ from exugear.gearbox.units import RPM, STANDARD_GRAVITY
 from exugear.project import Project
 from exugear.steady.evaluation.measured_comparison import MeasuredComparison, compare_run_up
 from exugear.steady.evaluation.run_up import read_run_up, response_settings
-from exugear.steady.mean_system.rotating_frame import SteadyError
+from exugear.steady.mean_system.planet_sets import SteadyError
 
 from ...cases.command import exugear
 from . import synthetic

@@ -8,7 +8,8 @@ import pytest
 from exugear.gearbox.choice import Choice
 from exugear.steady.mean_system.mean_system import PLACES, mean_system, tangents
 from exugear.steady.mean_system.mesh_waves import mesh_waves
-from exugear.steady.mean_system.rotating_frame import RotatingFrame, SteadyError, planet_sets
+from exugear.steady.mean_system.planet_sets import SteadyError, planet_sets
+from exugear.steady.mean_system.rotating_frame import RotatingFrame
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_response import response_of
 from exugear.system.bearings.stiffness import planet_supports, with_equal_planets

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from exugear.gearbox.choice import Choice
-from exugear.steady.mean_system.rotating_frame import RotatingFrame, planet_sets
+from exugear.steady.mean_system.planet_sets import planet_sets
+from exugear.steady.mean_system.rotating_frame import RotatingFrame
 from exugear.steady.settling import frame_coordinates
 from exugear.system.build import assemble
 
