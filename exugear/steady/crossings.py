@@ -99,16 +99,22 @@ def crossings(
     `operation` (rad/s, without sign) peaks are held against the largest of those there.
     """
     index = model.lines.index[:, : len(model.waves.base_orders)]
-    # Orders of a single mesh frequency and their sidebands, or of a shaft.
+    # Orders of a single mesh frequency and their sidebands, or of a shaft; a flexible ring gear makes sidebands of all.
     several = np.count_nonzero(index, axis=1) > 1
+    if model.waves.neighbours:
+        several |= ~index.any(axis=1) | model.lines.index[:, len(model.waves.base_orders) :].any(axis=1)
     lines = [int(line) for line in np.flatnonzero(~several) if line]
+    model = model.frozen
+    followed = FollowedModes(model.system, tracks)
     middle = float(model.system.speeds[1])
     forces = forcing(model.at(middle))[lines]
     loads = model.shaft_loads(middle)[lines]
     met = _passages(tracks, model.lines.orders[lines])
     if not met:
         return ()
-    peaks = np.array([_peak(model, tracks, mode, speed, forces[at], loads[at]) for mode, at, speed in met])
+    peaks = np.array(
+        [_peak(model, followed.near(mode, speed), speed, forces[at], loads[at]) for mode, at, speed in met]
+    )
     shares = _shares(peaks)
     counted = _shares(peaks)
     if operation is not None:
@@ -120,9 +126,9 @@ def crossings(
 
     def exact(n: int) -> Crossing:
         mode, at, speed = met[n]
-        value = _followed(model.system, tracks, mode, speed).value
+        value = followed.near(mode, speed).value
         near = Crossing(speed, lines[at], mode, value.imag / 2.0 / np.pi, -value.real / abs(value), float(shares[n]))
-        return _met(model.system, tracks, model.lines.orders, near)
+        return _met(model.system, followed, model.lines.orders, near)
 
     low = tracks.speeds[0]
     high = tracks.speeds[-1]
@@ -213,36 +219,41 @@ def _passages(tracks: ModeTracks, orders: Floats) -> list[tuple[int, int, float]
     return found
 
 
-def _followed(system: MeanSystem, tracks: ModeTracks, mode: int, speed: float) -> Mode:
-    """Mode at the followed speed that is nearest to another."""
-    apart = np.where(np.isnan(tracks.eigenvalues[:, mode].imag), np.inf, np.abs(tracks.speeds - speed))
-    n = int(np.argmin(apart))
-    left = np.linalg.solve(system.mass.T, tracks.left[n, mode])
-    return Mode(complex(tracks.eigenvalues[n, mode]), tracks.shapes[n, mode], left)
+class FollowedModes:
+    """Modes that were followed over speed, with the left shapes that loads meet."""
+
+    def __init__(self, system: MeanSystem, tracks: ModeTracks) -> None:
+        self._tracks = tracks
+        left = tracks.left.reshape(-1, system.size)
+        self._left = np.linalg.solve(system.mass.T, left.T).T.reshape(tracks.left.shape)
+
+    def near(self, mode: int, speed: float) -> Mode:
+        """Mode at the followed speed that is nearest to another, rad/s."""
+        tracks = self._tracks
+        apart = np.where(np.isnan(tracks.eigenvalues[:, mode].imag), np.inf, np.abs(tracks.speeds - speed))
+        n = int(np.argmin(apart))
+        return Mode(complex(tracks.eigenvalues[n, mode]), tracks.shapes[n, mode], self._left[n, mode])
 
 
-def _peak(
-    model: HarmonicBalanceModel, tracks: ModeTracks, mode: int, speed: float, force: Complexes, load: Complexes
-) -> Floats:
+def _peak(model: HarmonicBalanceModel, followed: Mode, speed: float, force: Complexes, load: Complexes) -> Floats:
     """Find what a mode makes at resonance of a line with forces (m, f) of the meshes and a load (size,), (signals,).
 
     Signals are the overall transmission error and the deflections of the meshes.
     """
-    followed = _followed(model.system, tracks, mode, speed)
     ports = model.ports_at(speed)
     rows = np.vstack([model.row_of_overall(speed)[None], ports.readings[:, DEFLECTION]])
     pushed = abs(followed.left @ (load - model.loads(ports) @ force.ravel()))
     return np.asarray(np.abs(rows @ followed.shape) * pushed / abs(followed.value.real))
 
 
-def _met(system: MeanSystem, tracks: ModeTracks, orders: Floats, near: Crossing) -> Crossing:
+def _met(system: MeanSystem, followed: FollowedModes, orders: Floats, near: Crossing) -> Crossing:
     """Find a crossing with the mode as it is at that speed, by Rayleigh quotients from either side.
 
     Ostrowski (1959); their error is cubed from one to the next, and the speed goes with them.
     """
     order = float(orders[near.line])
     at = near.speed
-    start = _followed(system, tracks, near.mode, at)
+    start = followed.near(near.mode, at)
     mode = Mode(complex(start.value.real, order * abs(at)), start.shape, start.left)
     for _ in range(ROUNDS):
         mode = improved(mode, system.mass, system.damping_at(at), system.stiffness_at(at))

@@ -199,10 +199,9 @@ class HarmonicBalanceModel:
         self.shaft_orders = orders or ShaftOrders()
         # Lines of the larger set are kept apart where forces are evaluated in time.
         self._usual = self._reach = HarmonicTruncation(2 * harmonics, 2 * combinations)
-        self.lines, self.larger = (
-            self._lines_within(HarmonicTruncation(harmonics, combinations)),
-            self._lines_within(self._usual),
-        )
+        self.lines = self._lines_within(HarmonicTruncation(harmonics, combinations))
+        # Only forces that are evaluated in time need it, and these are not with a flexible ring gear.
+        self.larger = self.lines if waves.neighbours else self._lines_within(self._usual)
         self._least = 0
         # Shared by all that differ in their lines alone.
         self._lattices: dict[tuple[HarmonicTruncation, int, int], TorusSampling] = {}
@@ -341,6 +340,15 @@ class HarmonicBalanceModel:
         other.waves = replace(self.waves, system=system)
         return other
 
+    @cached_property
+    def frozen(self) -> HarmonicBalanceModel:
+        """The same with the carriers held at zero angle where a flexible ring gear varies the stiffness; else itself.
+
+        Its modes are those of the gearbox: springs at all places of the ring raise those of the averaged system.
+        """
+        system = self.system.frozen
+        return self if system is self.system else self.with_system(system)
+
     def of(self, which: Booleans) -> HarmonicBalanceModel:
         """Copy with some of its orders, selected by a mask (n,)."""
         other = self._copied()
@@ -377,6 +385,10 @@ class HarmonicBalanceModel:
         combinations = self._usual.combinations
         other.harmonics, other._least = 2 * harmonics, 0
         other._usual = other._reach = HarmonicTruncation(2 * harmonics, combinations)
+        if self.waves.neighbours:  # those beside the known lines are known to be needed
+            more = line_set(self.waves.base_orders.tolist(), harmonics, combinations // 2)
+            other.lines = joined(self.lines, beside(more, [planets for _, planets in self.waves.carriers], 0))
+            return other
         other.lines = self._lines_within(HarmonicTruncation(harmonics, combinations // 2))
         other.larger = self._lines_within(other._usual)
         return other

@@ -17,12 +17,30 @@ all lines, which GMRES then solves in a few products, however many neighbours th
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import NamedTuple
+
 import numpy as np
 
 from exugear.steady.excitation import HarmonicBalanceModel, Interface
 from exugear.steady.harmonics.lines import Group, HarmonicCoupling
 from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, Family, coupled
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
+
+
+class SolvedGroups(NamedTuple):
+    """Groups of lines that passing planets couple, and the solution of their equation; g groups of n lines each."""
+
+    lines: Integers
+    """(g, n)"""
+    mirrored: Booleans
+    """(g, n) whether a line is taken in as its conjugate."""
+    inverse: Complexes
+    """(g, n s, n s) of the equation of the ring's readings."""
+    forces: Complexes
+    """(g, n s, n s) forces of the ring's waves by these readings."""
+    answers: Complexes
+    """(g, n, k, s) all readings under a unit of each of these forces."""
 
 
 class PassingPlanets:
@@ -61,7 +79,7 @@ class PassingPlanets:
         self._frequencies = interface.frequencies
         self._coupling = HarmonicCoupling(model.lines, (_turns(family, len(partners), model.lines.index.shape[1]),))
         mean = functions.reshape(-1, 2 * family.turns + 1, *functions.shape[1:])
-        self._prepare(family, mean[len(mean) // 2], answers)
+        self._solved_groups = tuple(self._groups(family, mean[len(mean) // 2], answers))
 
     def damper_forces(self, readings: Complexes) -> Complexes:
         """Return the forces (n, k) of the meshes' dampers beyond those of the averaged system, from readings (n, k)."""
@@ -71,54 +89,65 @@ class PassingPlanets:
         found[:, self._waves] = self._coupling.of([self._of_damper], rates)
         return found
 
-    def _prepare(self, family: Family, stiffness: Complexes, answers: Complexes) -> None:
-        """Solve all groups of lines with their neighbours, in which the mesh cycle does not vary."""
-        places, mirrored, frequencies = self._groups(family)
-        count = stiffness.shape[-1]
-        groups, members = places.shape
-        turns = family.turns // family.planets.waves if family.planets is not None else 0
-        step = family.planets.waves if family.planets is not None else 1
-        blocks = np.zeros((groups, members, members, count, count), dtype=complex)
-        for apart in range(-turns, turns + 1):
-            at = family.turns + apart * step
-            for there in range(max(0, -apart), members - max(0, apart)):
-                rates = 1j * frequencies[:, there, None, None] * np.eye(count) + self._carried
-                blocks[:, there + apart, there] = stiffness[at] + self._of_damper[at] @ rates
-        present = places >= 0
-        blocks *= (present[:, :, None] & present[:, None, :])[..., None, None]
-        found = answers[np.maximum(places, 0)][..., self._waves]
-        answering = np.where(mirrored[..., None, None], found.conj(), found)
-        own = answering[:, :, self._waves]
-        matrix = np.einsum("giab,gijbc->giajc", own, blocks, optimize=True).reshape(groups, members * count, -1)
-        self._inverse = np.linalg.inv(matrix + np.eye(members * count))
-        self._blocks = blocks.swapaxes(2, 3).reshape(groups, members * count, members * count)
-        self._places, self._mirrored, self._present, self._answering = places, mirrored, present, answering
+    def _groups(self, family: Family, stiffness: Complexes, answers: Complexes) -> Iterator[SolvedGroups]:
+        """Solve the groups of lines with their neighbours, in which the mesh cycle does not vary, by their size.
 
-    def _groups(self, family: Family) -> tuple[Integers, Booleans, Floats]:
-        """Lines (g, members) of each group in the order of their passings, -1 for none; conjugates; frequencies."""
+        `stiffness` (2 turns + 1, s, s) couples the ring's signals at multiples of the carrier's angle.
+        """
+        assert family.planets is not None
         index = self._lines.index
+        step = family.planets.waves
         passing = np.zeros(index.shape[1], dtype=np.int64)
-        passing[family.carrier] = family.planets.waves if family.planets is not None else 1
-        most = int(np.abs(index[:, family.carrier]).max()) // passing[family.carrier]
-        middle = index[np.abs(index[:, family.carrier]) < passing[family.carrier]]
-        rows = middle[:, None, :] + np.arange(-most, most + 1)[:, None] * passing
+        passing[family.carrier] = step
+        most = int(np.abs(index[:, family.carrier]).max()) // step
+        alone = index[np.abs(index[:, family.carrier]) < step]
+        rows = alone[:, None, :] + np.arange(-most, most + 1)[:, None] * passing
         places, mirrored = self._lines.find(rows)
         speed = self._frequencies[-1] / self._lines.orders[-1]
-        return places, mirrored, speed * (rows @ self._lines.bases)
+        frequencies = speed * (rows @ self._lines.bases)
+        sizes = (places >= 0).sum(axis=1)
+        for size in np.unique(sizes[sizes > 1]):
+            group, member = np.nonzero((places >= 0) & (sizes == size)[:, None])
+            group, member = group.reshape(-1, size), member.reshape(-1, size)
+            own = places[group, member], mirrored[group, member]
+            apart = step * (member[:, :, None] - member[:, None, :])
+            yield self._solved(family, stiffness, answers, own, frequencies[group, member], apart)
+
+    def _solved(
+        self,
+        family: Family,
+        stiffness: Complexes,
+        answers: Complexes,
+        lines: tuple[Integers, Booleans],
+        frequencies: Floats,
+        apart: Integers,
+    ) -> SolvedGroups:
+        """Solve groups of one size: lines (g, n), whether as conjugates, frequencies (g, n), turns between (g, n, n)."""
+        places, mirrored = lines
+        groups, members = places.shape
+        count = stiffness.shape[-1]
+        coupled_ones = np.abs(apart) <= family.turns
+        turns = np.where(coupled_ones, apart, 0) + family.turns
+        rates = 1j * frequencies[..., None, None] * np.eye(count) + self._carried
+        blocks = stiffness[turns] + self._of_damper[turns] @ rates[:, None]
+        blocks *= coupled_ones[..., None, None]
+        found = answers[places][..., self._waves]
+        answering = np.where(mirrored[..., None, None], found.conj(), found)
+        matrix = (answering[:, :, None, self._waves] @ blocks).swapaxes(2, 3).reshape(groups, members * count, -1)
+        inverse = np.linalg.inv(matrix + np.eye(members * count))
+        forces = blocks.swapaxes(2, 3).reshape(groups, members * count, -1)
+        return SolvedGroups(places, mirrored, inverse, forces, answering)
 
     def solve(self, right: Complexes) -> Complexes:
         """Solve the equation (n, k) in which the mesh cycle does not vary."""
-        given = right[np.maximum(self._places, 0)]
-        given = np.where(self._mirrored[..., None], given.conj(), given) * self._present[..., None]
-        groups, members, _ = given.shape
-        own = self._inverse @ given[..., self._waves].reshape(groups, -1, 1)
-        forces = (self._blocks @ own).reshape(groups, members, -1, 1)
-        solved = given - (self._answering @ forces)[..., 0]
         out = right.copy()
-        direct = self._present & ~self._mirrored
-        out[self._places[direct]] = solved[direct]
-        conjugate = self._present & self._mirrored
-        out[self._places[conjugate]] = solved[conjugate].conj()
+        for group in self._solved_groups:
+            given = np.where(group.mirrored[..., None], right[group.lines].conj(), right[group.lines])
+            own = group.inverse @ given[..., self._waves].reshape(len(given), -1, 1)
+            forces = (group.forces @ own).reshape(*given.shape[:2], -1, 1)
+            solved = given - (group.answers @ forces)[..., 0]
+            out[group.lines[group.mirrored]] = solved[group.mirrored].conj()
+            out[group.lines[~group.mirrored]] = solved[~group.mirrored]
         return out
 
 

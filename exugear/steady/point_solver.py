@@ -156,7 +156,7 @@ class PointSolver:
 
     def growth(self, low: float, high: float) -> float:
         """Fastest growth of a disturbance between two speeds of the input (rad/s), 1/s."""
-        model = self.linear.without_shaft_orders
+        model = self.linear.without_shaft_orders.frozen
         found = [mean_growth(model)]
         unknown = model.loses_contact or model.waves.carriers
         for candidate in () if unknown else candidates(model, low, high)[:CHECKED]:

@@ -31,6 +31,8 @@ from fe_ste.tools.octets import SIZE
 
 TOLERANCE = 1e-9
 """Residual of the balance over the static deflections."""
+PASSING_TOLERANCE = 1e-6
+"""The same where planets pass a flexible ring gear: neighbours that are left out are larger by far."""
 POSITIONS_REPEATED = 2
 """Solutions after the first one, with positions in the mesh cycle that move with the orders of shafts."""
 LARGEST_SHIFT = 0.1
@@ -197,6 +199,7 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
     still = lengths * interface.static[..., : shape[2]].reshape(shape[0], -1)
     repeated = bool(model.shaft_orders.sidebands) or model.ring is not None
     balance = LineBalance(model, interface, answers)
+    passing = balance.passing
     given = given_forces(model, interface) + deviation_forces(model, interface)
     moved = np.zeros_like(given)
     found = None
@@ -212,7 +215,7 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
             moved = forces_of_positions(model, response)
         if model.ring is not None:
             shifted = at_mean_positions(model, interface, response)
-            balance = LineBalance(model, shifted, answers)
+            balance = LineBalance(model, shifted, answers, passing)
             given = given_forces(model, shifted) + deviation_forces(model, shifted)
     return response
 
@@ -223,9 +226,16 @@ class LineBalance:
     Parameters
     ----------
     answers : (n, k, k) readings of each line under a unit of each force, G
+    passing : of a flexible ring gear, at any positions in the mesh cycle; by default it is found
     """
 
-    def __init__(self, model: HarmonicBalanceModel, interface: Interface, answers: Complexes) -> None:
+    def __init__(
+        self,
+        model: HarmonicBalanceModel,
+        interface: Interface,
+        answers: Complexes,
+        passing: PassingPlanets | None = None,
+    ) -> None:
         functions = _slopes_beyond_mean(model, interface)
         lengths = model.lengths[: interface.ports.forces.shape[0], : interface.ports.forces.shape[1]].ravel()
         self._coupling = model.coupling
@@ -237,28 +247,28 @@ class LineBalance:
         self._parts = *flat(self._functions), *flat([answers])
         self._memory = self._coupling.memory()
         self._octets = np.empty(2 * SIZE)
-        self._passing = None
-        if model.ring is not None:
+        self.passing = passing
+        if model.ring is not None and passing is None:
             of_ring = self._functions[model.families.index(model.ring)]
-            self._passing = PassingPlanets(model, interface, of_ring, answers, lengths)
+            self.passing = PassingPlanets(model, interface, of_ring, answers, lengths)
 
     def _apply(self, readings: Complexes) -> Complexes:
         out = np.empty_like(readings)
         add_answered(cached_bundle(self._coupling.terms), *self._parts, readings, *self._memory, self._octets, out)
-        if self._passing is None:
+        if self.passing is None:
             return out
-        damped = self._passing.damper_forces(readings)
-        return self._passing.solve(out + (self._answers @ damped[..., None])[..., 0])
+        damped = self.passing.damper_forces(readings)
+        return self.passing.solve(out + (self._answers @ damped[..., None])[..., 0])
 
     def forces(self, readings: Complexes) -> Complexes:
         """Return the forces (n, k) K y."""
         found = self._coupling.of(self._functions, readings)
-        return found if self._passing is None else found + self._passing.damper_forces(readings)
+        return found if self.passing is None else found + self.passing.damper_forces(readings)
 
     def solve(self, right: Complexes, start: Complexes | None) -> tuple[Complexes, int]:
         """Solve for readings (n, k); the products with K that it took follow."""
-        given = right if self._passing is None else self._passing.solve(right)
-        return solve_lines(self._apply, given, TOLERANCE, start)
+        given = right if self.passing is None else self.passing.solve(right)
+        return solve_lines(self._apply, given, TOLERANCE if self.passing is None else PASSING_TOLERANCE, start)
 
 
 def at_mean_positions(model: HarmonicBalanceModel, interface: Interface, response: Response) -> Interface:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import partial
 
 import numpy as np
@@ -33,6 +33,7 @@ from exugear.steady.harmonics.lines import LineSet
 from exugear.steady.mean_system.mesh_places import DEFLECTION
 from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.mean_system.signals import SignalName
+from exugear.steady.neighbours import judged_speeds, with_needed_neighbours
 from exugear.steady.nonlinear import HarmonicResidual, Tangent, growth_of_state
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.response import Response, dissipated_and_given, exchanged_power, signals
@@ -211,6 +212,8 @@ class SteadyResponse(ReprMixin):
     growth_rate: float
     """Largest growth rate of any disturbance over the speeds, 1/s: of the averaged system at combination resonances of
     two modes and a mesh frequency, and of the points with contact loss."""
+    neighbours_left_out: float
+    """Share of the meshes' deflections in orders beside others that were left out, of a flexible ring gear, at most."""
     planet_spread: float
     """Largest change of planet bearings' stiffness that made the planets equal, over that stiffness."""
     stiffness_variation: float
@@ -309,6 +312,13 @@ def response_of(
         model.loses_contact or model.waves.varies or bool(model.shaft_orders.sidebands)
     )
     found = crossings(model, tracks, solver.forcing, operation) if at_resonances else ()
+    neglected = 0.0
+    if model.waves.neighbours:
+        every = model.lines.index
+        judged = judged_speeds(float(even.min()), float(even.max()), found)
+        model, neglected = with_needed_neighbours(model, judged)
+        solver = PointSolver(model, settings.method)
+        found = tuple(replace(one, line=int(model.lines.find(every[one.line])[0])) for one in found)
     folds: tuple[float, ...] = ()
     ended = ""
     if settings.branches:
@@ -325,10 +335,11 @@ def response_of(
         raise HarmonicBalanceError(str(points.remark[0]))
     solved = points.part(is_solved)
     linear = solver.linear
+    frozen = linear.frozen
     explained = []
     for crossing in () if linear.loses_contact else found[:PEAKS_WITH_CONTRIBUTIONS]:
-        speed = loudest_near(linear, crossing.speed, 2.0 * crossing.damping, crossing.line)
-        explained.append((crossing.line, contributions(linear, speed, crossing.line)))
+        speed = loudest_near(frozen, crossing.speed, 2.0 * crossing.damping, crossing.line)
+        explained.append((crossing.line, contributions(frozen, speed, crossing.line)))
     band = no_band(tuple(quantity.name for quantity in linear.quantities))
     if settings.method != "nonlinear" and not linear.loses_contact:
         band = damping_band(linear, settings.method, solved.speed, solved.amplitude)
@@ -351,13 +362,14 @@ def response_of(
         folds=folds,
         branch_ended=ended,
         growth_rate=float(np.fmax.reduce(solved.growth, initial=growth)),
+        neighbours_left_out=neglected,
         planet_spread=model.system.planet_spread,
         stiffness_variation=model.system.variation,
         harmonics=model.usual_harmonics,
         left_out=model.waves.left_out(model.usual_harmonics),
         change_with_more=math.nan if settings.branches else _change_with_more(solver, solved),
         band=band,
-        campbell=campbell_of(linear.system, tracks),
+        campbell=campbell_of(linear.system.frozen, tracks),
     )
 
 
@@ -369,7 +381,7 @@ def _tracks(model: HarmonicBalanceModel, speeds: Floats) -> ModeTracks:
     highest = HARMONICS * float(model.waves.base_orders.max()) * float(np.abs(speeds).max()) / (2.0 * np.pi)
     if assembly.elastic_bodies:
         highest = min(highest, assembly.gearbox.case.elasticity.band_Hz)
-    return modes_over_speed(model.system, low, high, highest)
+    return modes_over_speed(model.system.frozen, low, high, highest)
 
 
 def _with_tops(
