@@ -27,6 +27,8 @@ NOTICED_CHANGE = 1e-2
 """Relative change of the highest peaks with more harmonics above which a warning is given."""
 NOTICED_VARIATION = 1e-3
 """Relative variation of stiffness with the carrier angle above which a warning is given."""
+NOTICED_NEIGHBOURS = 1e-2
+"""Share of the meshes' vibration in orders that are left out above which a warning is given."""
 NOTICED_SHUTTLING = 0.3
 """Ratio of shuttling moment to transmission error excitation above which a warning is given."""
 LEAST_AMPLITUDE = 1e-12
@@ -47,7 +49,7 @@ def response_findings(data: xr.Dataset) -> tuple[Finding, ...]:
     ----------
     data : as `exugear.steady.steady_file.load_response` reads it
     """
-    return (*_balance(data), *_speeds(data), *_models(data), *_excitation(data), *_sound(data))
+    return (*_balance(data), *_speeds(data), *_models(data), *_passing(data), *_excitation(data), *_sound(data))
 
 
 @dataclass(frozen=True)
@@ -161,6 +163,19 @@ def _models(data: xr.Dataset) -> Iterator[Finding]:
         text = f"stiffness varies by {100.0 * variation:.2g} % over a carrier revolution (unequal planet loads); the "
         text += "mean is used, and responses near lightly damped planet modes are off by a few thousandths"
         yield Finding("warning", text, variation)
+
+
+def _passing(data: xr.Dataset) -> Iterator[Finding]:
+    """Orders of planets that pass a flexible ring gear."""
+    carrier = str(data.attrs.get("ring_carrier", ""))
+    if not carrier:
+        return
+    left_out = float(data.attrs["neighbours_left_out"])
+    passing = data["index"].to_numpy()[:, list(data["base"].to_numpy()).index(carrier)]
+    count = int(np.count_nonzero(passing))
+    text = f"flexible ring gear: {count} orders of passing planets and beside mesh orders are included; those left out "
+    text += f"carry {100.0 * left_out:.1g} % of the vibration of the meshes"
+    yield Finding("warning" if left_out > NOTICED_NEIGHBOURS else "note", text, left_out)
 
 
 def _excitation(data: xr.Dataset) -> Iterator[Finding]:

@@ -14,10 +14,14 @@ import numpy as np
 from exugear.steady.crossings import Crossing
 from exugear.steady.excitation import HarmonicBalanceModel
 from exugear.steady.response import parametric_response
-from fe_ste.tools.arrays import Floats
+from fe_ste.tools.arrays import Complexes, Floats
 
-CARRIED = 2e-4
-"""Share of the deflections of all meshes that a line has to have at one of the speeds."""
+CARRIED = (1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
+"""Shares of the deflections of all meshes that a line has to have at one of the speeds, tried one after the other.
+
+Near a resonance of a damping ratio z what is left out counts by a factor of 1 / 2 z."""
+CHANGED = 5e-4
+"""Relative change by the lines left out, of all others together, with which a choice is good enough."""
 EVEN, AT_CROSSINGS = 3, 8
 """Speeds at which lines are judged: some even ones, and those of the strongest crossings of orders with modes."""
 
@@ -30,20 +34,39 @@ def judged_speeds(low: float, high: float, crossings: Sequence[Crossing]) -> Flo
 
 
 def with_needed_neighbours(model: HarmonicBalanceModel, speeds: Floats) -> tuple[HarmonicBalanceModel, float]:
-    """Leave out the neighbours of lines that carry hardly any vibration at some speeds (rad/s).
+    """Leave out the neighbours of lines that hardly change the vibration in the other lines at some speeds (rad/s).
 
     Returns
     -------
     model : with the lines of the meshes, of passing planets, and the relevant ones beside them
-    neglected : norm of the deflections in lines that are left out, over that of all lines, at most
+    changed : largest relative change of overall transmission error and deflections of the meshes by what is left out
     """
     meshes = len(model.waves.base_orders)
     index = model.lines.index
     beside = index[:, meshes:].any(axis=1) & index[:, :meshes].any(axis=1)
-    shares = []
-    for speed in map(float, speeds):
-        size = np.linalg.norm(parametric_response(model, model.at(speed)).deflection, axis=1)
-        shares.append(size / np.linalg.norm(size[1:]))
-    kept = ~beside | (np.max(shares, axis=0) > CARRIED)
-    neglected = max(float(np.linalg.norm(share[~kept])) for share in shares)
-    return model.of(kept), neglected
+    whole = [_vibration(model, speed) for speed in map(float, speeds)]
+    shares = np.array([np.linalg.norm(values[:, 1:], axis=1) for values in whole])
+    shares /= np.linalg.norm(shares[:, 1:], axis=1)[:, None]
+    few, changed = model, 0.0
+    for carried in CARRIED:
+        kept = ~beside | (shares.max(axis=0) > carried)
+        few = model.of(kept)
+        changed = max(
+            _change(_vibration(few, speed), values[kept])
+            for speed, values in zip(map(float, speeds), whole, strict=True)
+        )
+        if changed < CHANGED:
+            break
+    return few, changed
+
+
+def _vibration(model: HarmonicBalanceModel, speed: float) -> Complexes:
+    """Overall transmission error and deflections of the meshes (n, 1 + m) at a speed (rad/s), m."""
+    response = parametric_response(model, model.at(speed))
+    return np.column_stack([response.motion @ model.row_of_overall(speed), response.deflection])
+
+
+def _change(found: Complexes, known: Complexes) -> float:
+    """Change of the error, or of the deflections, in all lines but the mean, over their size; whichever is larger."""
+    parts = slice(0, 1), slice(1, None)
+    return max(float(np.linalg.norm((found - known)[1:, part]) / np.linalg.norm(known[1:, part])) for part in parts)

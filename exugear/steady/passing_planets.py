@@ -122,7 +122,7 @@ class PassingPlanets:
         frequencies: Floats,
         apart: Integers,
     ) -> SolvedGroups:
-        """Solve groups of one size: lines (g, n), whether as conjugates, frequencies (g, n), turns between (g, n, n)."""
+        """Solve groups of one size: lines (g, n), whether conjugates, frequencies (g, n), turns between (g, n, n)."""
         places, mirrored = lines
         groups, members = places.shape
         count = stiffness.shape[-1]

@@ -182,6 +182,21 @@ def check_deviations(gearbox: Gearbox, method: Method) -> None:
         )
 
 
+def check_ring(assembly: Assembly, method: Method) -> None:
+    """Refuse methods that do not include the variation of a flexible ring's stiffness under the planets.
+
+    Raises
+    ------
+    SteadyError
+        The ring gear is flexible, and the method is not ``parametric``.
+    """
+    if assembly.travelling.first.size and method != "parametric":
+        raise SteadyError(
+            f"the ring gear is flexible, and its stiffness under the passing planets varies: the method {method} does "
+            "not include that; use --method parametric with --mesh-model line_of_action, or exugear run"
+        )
+
+
 @dataclass(frozen=True)
 class SteadySettings:
     """What is asked for."""

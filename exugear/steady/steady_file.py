@@ -167,6 +167,8 @@ def _attributes(response: SteadyResponse) -> dict[str, Any]:
         "growth_rate": response.growth_rate,
         "near_unconverged_states": ", ".join(meshes_near_unconverged(assembly)),
         "planet_spread": response.planet_spread,
+        "ring_carrier": response.ring_carrier,
+        "neighbours_left_out": response.neighbours_left_out,
         "stiffness_variation": response.stiffness_variation,
         "operating_range": json.dumps(operating_range(assembly.gearbox)),
         "carried_seats": json.dumps(carried_seats(assembly)),

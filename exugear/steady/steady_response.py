@@ -37,7 +37,7 @@ from exugear.steady.neighbours import judged_speeds, with_needed_neighbours
 from exugear.steady.nonlinear import HarmonicResidual, Tangent, growth_of_state
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.response import Response, dissipated_and_given, exchanged_power, signals
-from exugear.steady.settings import SteadySettings, check_deviations, check_law, check_speeds
+from exugear.steady.settings import SteadySettings, check_deviations, check_law, check_ring, check_speeds
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers, SingleComplexes, Texts
 from fe_ste.tools.display import ReprMixin, TitledRows, value_range
@@ -212,6 +212,8 @@ class SteadyResponse(ReprMixin):
     growth_rate: float
     """Largest growth rate of any disturbance over the speeds, 1/s: of the averaged system at combination resonances of
     two modes and a mesh frequency, and of the points with contact loss."""
+    ring_carrier: str
+    """Carrier whose planets pass a flexible ring gear; empty without one."""
     neighbours_left_out: float
     """Share of the meshes' deflections in orders beside others that were left out, of a flexible ring gear, at most."""
     planet_spread: float
@@ -302,6 +304,7 @@ def response_of(
     check_speeds(assembly.gearbox, settings.speeds)
     check_law(assembly.mesh_model, settings.method)
     check_deviations(assembly.gearbox, settings.method)
+    check_ring(assembly, settings.method)
     even = settings.speeds.values
     model = harmonic_balance_model(assembly, even, settings.harmonics, settings.combinations)
     solver = PointSolver(model, settings.method)
@@ -362,6 +365,7 @@ def response_of(
         folds=folds,
         branch_ended=ended,
         growth_rate=float(np.fmax.reduce(solved.growth, initial=growth)),
+        ring_carrier=model.ring.planets.carrier if model.ring is not None and model.ring.planets is not None else "",
         neighbours_left_out=neglected,
         planet_spread=model.system.planet_spread,
         stiffness_variation=model.system.variation,

@@ -17,9 +17,10 @@ from typing import Any, TypeVar
 import numpy as np
 import scipy.linalg
 
+from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Mesh
 from exugear.steady.harmonics.linear_solvers import Elimination, elimination, solve_side_by_side
-from exugear.steady.mean_system.planet_sets import PlanetSet, SteadyError, planet_sets
+from exugear.steady.mean_system.planet_sets import PlanetSet, SteadyError, phases_ahead, planet_sets
 from exugear.steady.mean_system.rotating_frame import RotatingFrame
 from exugear.steady.mean_system.symmetric_carriers import SymmetricCarrier, symmetric_carrier
 from exugear.system.bearings.stiffness import load_stands_still, planet_supports, with_equal_planets
@@ -286,6 +287,7 @@ def unsuitable(assembly: Assembly, elastic: Collection[str] = ()) -> str:
     try:
         _check(assembly)
         planet_sets(assembly)
+        _check_ring(assembly, elastic)
     except SteadyError as error:
         return str(error)
     planets = {body.name for body in assembly.bodies if body.carrier is not None}
@@ -302,7 +304,7 @@ def _check(assembly: Assembly) -> None:
         )
     if not gearbox.meshes:
         raise SteadyError("the gear train has no meshes and no excitation; use exugear run instead")
-    _check_ring(assembly)
+    _check_ring(assembly, assembly.elastic_bodies)
     if gearbox.pin_offsets:
         raise SteadyError(
             "pins: position errors cause unequal planet loads that rotate with the carrier, which the steady-state "
@@ -325,30 +327,45 @@ def _check(assembly: Assembly) -> None:
             )
 
 
-def _check_ring(assembly: Assembly) -> None:
-    """Refuse flexible ring gears whose meshes cannot be written as waves around the carrier."""
-    travelling = [mesh for mesh in assembly.gearbox.meshes if _has_sectors(assembly, mesh)]
+def _check_ring(assembly: Assembly, elastic: Collection[str]) -> None:
+    """Refuse flexible ring gears whose meshes cannot be written as waves around one carrier of planets in phase."""
+    gearbox = assembly.gearbox
+    travelling = [mesh for mesh in gearbox.meshes if mesh.gear in elastic and _has_sectors(gearbox, mesh)]
     if not travelling:
         return
-    family = assembly.gearbox.body(travelling[0].gear).family
-    remedy = f"set flexibility = 'none' for bodies.{family}, or use exugear run"
-    if not all(assembly.gearbox.body(mesh.gear).fixed for mesh in travelling):
+    family = gearbox.body(travelling[0].gear).family
+    carrier = travelling[0].frame
+    reason = ""
+    planets = [body.name for body in gearbox.bodies() if body.carrier == carrier]
+    in_set = [n for n, element in enumerate(assembly.elements) if {element.mesh.pinion, element.mesh.gear} & {*planets}]
+    families: dict[str, list[int]] = {}
+    for n in in_set:
+        families.setdefault(assembly.elements[n].mesh.family, []).append(n)
+    if not all(gearbox.body(mesh.gear).fixed for mesh in travelling):
+        reason = "rotates"
+    elif len({mesh.family for mesh in travelling}) > 1:
+        reason = "is one of several"
+    elif len(travelling) % 2 == 0:
+        reason = f"has {len(travelling)} planets, an even number"
+    elif any(phases_ahead(assembly, meshes) for meshes in families.values()):
+        reason = "has planets that mesh out of phase"
+    elif gearbox.deviations:
+        reason = "meshes with gears that deviate (deviations)"
+    if reason:
         raise SteadyError(
-            f"the flexible ring gear of bodies.{family} rotates, which the steady-state response cannot treat; {remedy}"
-        )
-    if len({mesh.family for mesh in travelling}) > 1:
-        raise SteadyError(f"several ring gears are flexible, but the steady-state response can treat one; {remedy}")
-    if len(travelling) % 2 == 0:
-        raise SteadyError(
-            f"bodies.{family} has a flexible ring gear with {len(travelling)} planets, but the steady-state response "
-            f"can treat an odd number of planets in a flexible ring gear; {remedy}"
+            f"bodies.{family}: the flexible ring gear {reason}, which the steady-state response cannot treat yet; set "
+            f"flexibility = 'none' for bodies.{family}, or use exugear run"
         )
 
 
-def _has_sectors(assembly: Assembly, mesh: Mesh) -> bool:
-    """Return whether a mesh travels around the sectors of its flexible gear."""
-    body = assembly.elastic_bodies.get(mesh.gear)
-    return body is not None and mesh.pair.gear.name in body.sectors
+def _has_sectors(gearbox: Gearbox, mesh: Mesh) -> bool:
+    """Whether a mesh travels around the sectors of its gear where this is flexible."""
+    section = gearbox.case.bodies[gearbox.body(mesh.gear).family]
+    name = mesh.pair.gear.name
+    if section.external is not None:
+        return name in section.external.seats and bool(section.external.seats[name].sector_nodes)
+    seat = None if section.solid is None else section.solid.seats.get(name)
+    return seat is not None and seat.sectors is not None
 
 
 def _drive_and_load(assembly: Assembly) -> tuple[Floats, Floats]:

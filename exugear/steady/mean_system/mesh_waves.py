@@ -23,7 +23,7 @@ import numpy as np
 
 from exugear.steady.harmonics.lines import Modulator, fourier_coefficients
 from exugear.steady.mean_system.mean_system import MeanSystem
-from exugear.steady.mean_system.planet_sets import PlanetSet
+from exugear.steady.mean_system.planet_sets import IN_PHASE, PlanetSet, phases_ahead
 from exugear.steady.mean_system.rotating_frame import RotatingFrame
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.system.kernels.meshes import (
@@ -56,8 +56,6 @@ Those that carry hardly any vibration are left out later (`exugear.steady.neighb
 GRC are within 1e-3 of those with twelve at most speeds, with six within 2e-4."""
 CONSTANT = 1e-9
 """Variation of a compliance over its mean below which there is none."""
-IN_PHASE = 1e-6
-"""Mesh cycles by which planets in phase may differ."""
 SAME_BASE = 1e-9
 """Share by which mesh frequencies of one base may differ."""
 CycleQuantity = Literal["tangent", "secant", "exponent", "compliance", "way", "moment"]
@@ -366,7 +364,7 @@ def mesh_waves(system: MeanSystem, passing: int = 0, neighbours: int = NEIGHBOUR
             waves.append(MeshWave(mesh.name, mesh.name, *own, 0, 1.0, base, sense, 0.0))
             continue
         one_by_one = passing or any(planets is own for own in rings)
-        ahead = _phases_ahead(assembly, meshes) or (0.0,) * (len(meshes) if one_by_one else 0)
+        ahead = phases_ahead(assembly, meshes) or (0.0,) * (len(meshes) if one_by_one else 0)
         count = max(planets.waves if ahead else len(WAVES), 2 * frame.ring_waves(meshes[0]) + 1)
         for number, weight in enumerate(planets.norms(max(count, planets.waves))[:count]):
             label = f"{mesh.family} {wave_name(number, planets.waves)}" if number else mesh.family
@@ -412,13 +410,6 @@ def _cycles_per_turn(frame: RotatingFrame, mesh: int) -> float:
     speeds = frame.speeds
     relative = speeds.get(element.mesh.pinion, 0.0) - speeds.get(element.mesh.frame, 0.0)
     return float(frame.assembly.meshes.cycles[mesh] * relative)
-
-
-def _phases_ahead(assembly: Assembly, meshes: tuple[int, ...]) -> tuple[float, ...]:
-    """Cycles by which each mesh is ahead of the first, empty where all are in phase."""
-    phases = assembly.meshes.phase[list(meshes)]
-    apart = (phases - phases[0] + 0.5) % 1.0 - 0.5
-    return tuple(float(phase) for phase in apart) if np.abs(apart).max() > IN_PHASE else ()
 
 
 def _turns_per_cycle(wave: MeshWave, planets: PlanetSet) -> int | None:

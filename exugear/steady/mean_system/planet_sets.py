@@ -17,6 +17,10 @@ Jet: TypeAlias = tuple[Floats, Floats, Floats]
 """A function of the input's angle with two derivatives by it."""
 
 
+IN_PHASE = 1e-6
+"""Mesh cycles by which planets in phase may differ."""
+
+
 class SteadyError(ValueError):
     """A gearbox, or a wish, that the steady response cannot treat; the message says why."""
 
@@ -122,3 +126,10 @@ def _check_spacing(family: str, planets: Sequence[Body]) -> None:
             f"bodies.{family}.planet_angles_deg: with unequally spaced planets the matrices vary with the carrier "
             "angle, which the steady-state response cannot treat; use exugear run instead"
         )
+
+
+def phases_ahead(assembly: Assembly, meshes: Sequence[int]) -> tuple[float, ...]:
+    """Cycles by which each mesh is ahead of the first, empty where all are in phase."""
+    phases = assembly.meshes.phase[list(meshes)]
+    apart = (phases - phases[0] + 0.5) % 1.0 - 0.5
+    return tuple(float(phase) for phase in apart) if np.abs(apart).max() > IN_PHASE else ()

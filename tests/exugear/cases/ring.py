@@ -83,3 +83,31 @@ def ring_content(grc: Gearbox, folder: Path) -> dict[str, Any]:
         "damping": content["damping"],
         "elasticity": content["elasticity"],
     }
+
+
+def write_drum(file: Path) -> None:
+    """Carrier as a thick ring of flat-sided bricks, equal under a turn by 15 degrees, with faces at all bearings."""
+    meshio: Any = importlib.import_module("meshio")
+    around = 24
+    logical = skfem.MeshHex.init_tensor(
+        np.array([0.04, 0.12, 0.2, 0.308, 0.42]), np.arange(around + 1.0), np.array([-0.31, -0.1545, -0.0545, 0.0975])
+    )
+    radius, number, z = logical.p
+    angle = 2.0 * np.pi * number / around
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
+    _, first, joined = np.unique(np.round(points, 9), axis=0, return_index=True, return_inverse=True)
+    cells = joined.ravel()[logical.t.T[:, np.argsort([6, 2, 5, 7, 1, 3, 4, 0])]]  # order of VTK
+    meshio.Mesh(1e3 * points[first], [("hexahedron", cells)]).write(file)
+
+
+def drum_content(grc: Gearbox, folder: Path) -> dict[str, Any]:
+    """Content of the same gearbox file with a flexible carrier of this shape."""
+    content = ring_content(grc, folder)
+    write_drum(folder / "drum.vtu")
+    diameters = {"plc_a": 240.0, "plc_b": 240.0, "pl_a": 290.0, "pl_b": 290.0}
+    seats = {name: {"diameter_mm": wide, "inner_diameter_mm": 0.0} for name, wide in diameters.items()}
+    content["bodies"]["carrier"] |= {
+        "flexibility": "elastic",
+        "solid": {"file": "drum.vtu", "band_Hz": 1000.0, "seats": seats},
+    }
+    return content

@@ -277,12 +277,14 @@ def test_gears_that_only_roll_have_modes_of_rolling_alone(tmp_path):
     assert [mode["frequency_Hz"] for mode in json.loads(result.stdout)["modes"]] == [0.0]
 
 
-def test_the_steady_response_of_an_elastic_ring_is_refused_before_its_finite_elements(grc, tmp_path):
+def test_a_flexible_ring_that_steady_cannot_treat_is_refused_before_its_finite_elements(grc, tmp_path):
     """As `check` says it, though only the elastic body itself knows the seats that its meshes travel around."""
-    case = written(ring_content(grc, tmp_path), tmp_path)
+    content = ring_content(grc, tmp_path)
+    content["deviations"] = {"sun": {"body": "lss", "runout_um": 5.0}}
+    case = written(content, tmp_path)
     checked = exugear("check", case, "--json")
     reason = json.loads(checked.stdout)["steady"]["flexible"]
-    assert reason.startswith("the ring gear is flexible: stiffness varies with the carrier")
+    assert reason.startswith("bodies.housing: the flexible ring gear meshes with gears that deviate")
     result = exugear(
         "steady", case, "--variant", "flexible", "--speeds", "0:100", "--points", "5", "--out", tmp_path / "results"
     )

@@ -1,0 +1,202 @@
+"""A planetary stage with a flexible ring gear and carrier: its steady state against runs in time and its limits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.steady.mean_system.mean_system import mean_system, rotating_frame, unsuitable
+from exugear.steady.mean_system.mesh_waves import mesh_waves
+from exugear.steady.mean_system.planet_sets import SteadyError, planet_sets
+from exugear.steady.mean_system.symmetric_carriers import symmetric_carrier
+from exugear.steady.neighbours import with_needed_neighbours
+from exugear.steady.response import dissipated_and_given, parametric_response, signals
+from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.steady.settling import frame_coordinates
+from exugear.steady.steady_response import response_of
+from exugear.system.build import elastic_arrays
+
+from ...optional_libraries import needs_meshio
+from ..cases.assembled import assembled
+from ..cases.ring import drum_content, ring_content
+from ..cases.steady_runs import apart, solver_of
+
+pytestmark = needs_meshio
+
+SPEED = 8.0
+RANGE = (7.0, 9.0)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("stage")
+
+
+@pytest.fixture(scope="module")
+def drum(grc, stiffness, folder):
+    """Planetary stage with a flexible ring gear and a flexible carrier."""
+    content = drum_content(grc, folder)
+    return assembled(Gearbox.from_dict(content, str(folder / "drum.toml")), Choice("flexible"), stiffness)
+
+
+@pytest.fixture(scope="module")
+def solver(drum):
+    return solver_of(drum, RANGE, "parametric", 6)
+
+
+@pytest.fixture(scope="module")
+def response(solver):
+    return solver.response(SPEED)
+
+
+def test_the_forces_of_a_symmetric_carrier_do_not_change_as_it_turns(drum):
+    """Elastic, damping and inertia forces in the rotating frame, at random coordinates, rates and accelerations."""
+    frame = rotating_frame(drum, planet_sets(drum))
+    assembly = frame.assembly
+    own = assembly.elastic_slices["carrier"]
+    random = np.random.default_rng(1)
+    u, du, ddu = np.zeros((3, assembly.size))
+    for values, size in ((u, 1e-5), (du, 1e-3), (ddu, 1e-2)):
+        values[own] = size * random.normal(size=own.stop - own.start)
+
+    def forces(psi: float) -> np.ndarray:
+        q, v, a = frame.state(psi, 2.3, u, du, ddu)
+        inner = np.zeros(assembly.size)
+        inner[own] = assembly.turning["carrier"].forces(q[own], v[own])
+        return (frame.matrices(psi)[0].T @ (assembly.inertia_forces(q, v, a) - inner))[own]
+
+    still = forces(0.0)
+    for psi in (0.3, 1.0, 2.2):
+        assert np.abs(forces(psi) - still).max() < 1e-10 * np.abs(still).max()
+
+
+def test_the_frame_and_its_derivatives_are_those_of_differences_and_turn_back(drum):
+    frame = rotating_frame(drum, planet_sets(drum))
+    step = 1e-6
+    for function in (frame._matrices, frame._rolling):
+        _, slope, bend = function(0.4)
+        for n, derivative in enumerate((slope, bend)):
+            difference = (function(0.4 + step)[n] - function(0.4 - step)[n]) / (2.0 * step)
+            np.testing.assert_allclose(derivative, difference, atol=1e-8)
+    u = 1e-5 * np.random.default_rng(2).normal(size=drum.size)
+    angles = np.array([0.0, 0.7, 9.0])
+    q = np.array([frame.state(float(psi), 2.0, u)[0] for psi in angles])
+    np.testing.assert_allclose(frame_coordinates(frame, q, angles), np.tile(u, (3, 1)), atol=1e-14)
+
+
+def test_a_carrier_is_made_equal_under_a_turn_by_one_planet(drum):
+    """A body that was symmetric stays; noise of a thousandth becomes the mean over the three turns, and is told."""
+    planets = planet_sets(drum)[0]
+    body = drum.elastic_bodies["carrier"].reduced
+    kept = symmetric_carrier("carrier", body, planets, (0.0, 0.0))
+    assert kept.spread < 1e-6
+    noise = np.random.default_rng(3).normal(size=body.mass.shape)
+    scale = np.sqrt(np.abs(np.diag(body.stiffness)))
+    noisy = replace(body, stiffness=body.stiffness + 1e-3 * np.outer(scale, scale) * (noise + noise.T))
+    found = symmetric_carrier("carrier", noisy, planets, (0.0, 0.0))
+    assert 1e-4 < found.spread < 0.05
+    again = symmetric_carrier("carrier", found.body, planets, (0.0, 0.0))
+    assert again.spread < 1e-3 * found.spread
+    with pytest.raises(SteadyError, match="under a turn by one planet"):
+        lopsided = body.stiffness.copy()
+        lopsided[: 6 * 3, : 6 * 3] *= 2.0
+        symmetric_carrier("carrier", replace(body, stiffness=lopsided), planets, (0.0, 0.0))
+
+
+def test_the_waves_of_ring_meshes_are_exact_at_any_angle_of_the_carrier(drum):
+    """Gradients of the deflections of all meshes by the frame's coordinates, between the places they come from."""
+    system = mean_system(drum, np.array(RANGE))
+    waves = mesh_waves(system)
+    frame = system.frame
+    rows = frame.assembly.meshes.deflection
+    gradients = waves.gradients(rows, SPEED)
+    for psi in (0.1, 0.77):
+        turned = np.array([rows_at(waves, psi)[n] for n in range(len(rows))])
+        for meshes, planets in waves.groups:
+            own = [n for n, wave in enumerate(waves.waves) if wave.first == meshes[0]]
+            shapes = planets.values(np.array(planets.ratio * psi), max(len(own), planets.waves))[:, : len(own)]
+            expected = turned[list(meshes)]
+            np.testing.assert_allclose(shapes @ gradients[own], expected, atol=2e-3 * np.abs(expected).max())
+
+
+def rows_at(waves, psi):
+    """Gradients (meshes, size) of the deflections at an angle of the input by central differences."""
+    frame = waves.system.frame
+    assembly = frame.assembly
+    u = waves.system.static_at(SPEED)
+    step = 1e-7
+
+    def deflections(place):
+        q, v, _ = frame.state(psi, SPEED, place)
+        return assembly.mesh_states(q, v, frame.mean_meshes)[:, 0]
+
+    return np.array([(deflections(u + e) - deflections(u - e)) / (2.0 * step) for e in step * np.eye(len(u))]).T
+
+
+@pytest.mark.parametrize("speed", [7.4, SPEED])
+def test_a_run_that_starts_on_the_steady_state_stays_there(solver, speed):
+    """RK4 at 1/200 kHz. Passing planets are the largest order of the transmission error."""
+    complex_error, amplitude_error = apart(solver, speed, 0.9, 5e-6, 0.6, solver.model.waves.assembly)
+    print(complex_error, amplitude_error)
+    assert amplitude_error < 2e-3
+    assert complex_error < 4e-3
+
+
+def test_damping_takes_the_power_that_the_meshes_give(solver, response):
+    taken, given = dissipated_and_given(solver.model, response)
+    assert given == pytest.approx(taken, rel=1e-4)
+
+
+def test_lines_that_are_left_out_change_the_others_by_what_is_told(solver, response):
+    few, changed = with_needed_neighbours(solver.model, np.array([SPEED]))
+    assert 0.0 < changed < 1e-3
+    assert len(few.lines.orders) < len(solver.model.lines.orders)
+    found = signals(few, parametric_response(few, few.at(SPEED)))[1:, 0]
+    at = solver.model.lines.find(few.lines.index[1:])[0]
+    known = signals(solver.model, response)[at, 0]
+    assert np.linalg.norm(found - known) < 1.01 * changed * np.linalg.norm(known)
+
+
+def test_a_stiff_ring_and_carrier_give_the_response_of_rigid_ones(grc, stiffness, folder):
+    """Stiffness of bodies and mounts times 300: what is left is in proportion to their compliance."""
+    content = drum_content(grc, folder)
+    for mount in content["mounts"].values():
+        mount["stiffness"] = {name: 300.0 * value for name, value in mount["stiffness"].items()}
+    gearbox = Gearbox.from_dict(content, str(folder / "stiff.toml"))
+    elastic = assembled(gearbox, Choice("flexible"), stiffness)
+    stiffer = {
+        name: replace(body, reduced=replace(body.reduced, stiffness=300.0 * body.reduced.stiffness))
+        for name, body in elastic.elastic_bodies.items()
+    }
+    arrays = elastic_arrays(stiffer, elastic.size, gearbox.case.damping.body_time_s)
+    elastic = replace(elastic, elastic_bodies=stiffer, elastic=arrays)
+    plain = {"bodies.carrier.flexibility": "none", "bodies.housing.flexibility": "none"}
+    rigid = assembled(gearbox.varied(plain), Choice("bushing"), stiffness)
+    solvers = [solver_of(each, RANGE, "parametric", 6) for each in (elastic, rigid)]
+    found, known = (signals(each.model, each.response(SPEED))[1:, 0] for each in solvers)
+    alone = np.pad(solvers[1].model.lines.index[1:], ((0, 0), (0, 1)))
+    at = solvers[0].model.lines.find(alone)[0] - 1
+    assert np.linalg.norm(found[at] - known) < 1e-2 * np.linalg.norm(known)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"deviations.one": {"body": "lss", "runout_um": 5.0}}, "deviate"),
+    ],
+)
+def test_what_a_flexible_ring_cannot_have_is_refused_before_any_work(grc, stiffness, folder, changes, said):
+    gearbox = Gearbox.from_dict(ring_content(grc, folder), str(folder / "ring.toml")).varied(changes)
+    bushing = assembled(gearbox, Choice("bushing"), stiffness)
+    assert said in unsuitable(bushing, ("housing",))
+    assert not unsuitable(bushing)
+
+
+@pytest.mark.parametrize("method", ["linear", "nonlinear"])
+def test_methods_without_the_variation_of_the_ring_are_refused_by_name(drum, method):
+    with pytest.raises(SteadyError, match="use --method parametric"):
+        response_of(drum, SteadySettings(SpeedRange(*RANGE, 2), method))
