@@ -66,10 +66,9 @@ class PassingPlanets:
         forces = interface.ports.forces.shape[1]
         self._waves = slice(forces * family.first, forces * (family.first + family.count))
         self._lines = model.lines
-        damping = model.waves.damping[:, None] + 0j
-        dampers = {(DEFLECTION, DEFLECTION): damping}
+        dampers = {(DEFLECTION, DEFLECTION): model.waves.damping[:, None].astype(np.complex128)}
         if model.shuttles:
-            dampers[MISALIGNMENT, MISALIGNMENT] = model.ring_tilting[:, 1:2] + 0j
+            dampers[MISALIGNMENT, MISALIGNMENT] = model.ring_tilting[:, 1:2].astype(np.complex128)
         of_damper = coupled(model.waves, family, dampers, interface.ports, interface.speed, forces)
         of_damper /= lengths[self._waves]
         of_damper[family.turns] = 0.0  # the mean is in the averaged system
@@ -107,8 +106,7 @@ class PassingPlanets:
         frequencies = speed * (rows @ self._lines.bases)
         sizes = (places >= 0).sum(axis=1)
         for size in np.unique(sizes[sizes > 1]):
-            group, member = np.nonzero((places >= 0) & (sizes == size)[:, None])
-            group, member = group.reshape(-1, size), member.reshape(-1, size)
+            group, member = (at.reshape(-1, size) for at in np.nonzero((places >= 0) & (sizes == size)[:, None]))
             own = places[group, member], mirrored[group, member]
             apart = step * (member[:, :, None] - member[:, None, :])
             yield self._solved(family, stiffness, answers, own, frequencies[group, member], apart)

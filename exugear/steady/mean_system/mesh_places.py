@@ -294,8 +294,9 @@ def _place_coefficients(family: Family, cycles: Complexes, ports: MeshInterface,
     theta = 2.0 * math.pi * np.arange(samples) / samples
     there = wave_shapes(family.planets, speed, theta if family.carrier >= 0 else None, family.count)
     there = np.broadcast_to(there, (samples, *there.shape[-2:]))
-    one_by_one = family.planets is not None and family.carrier >= 0
-    norms = family.planets.norms(family.count) if one_by_one else (there**2).sum(axis=-2, keepdims=True)
+    norms = (there**2).sum(axis=-2, keepdims=True)
+    if family.planets is not None and family.carrier >= 0:
+        norms = family.planets.norms(family.count)
     back = np.swapaxes(there / norms, -1, -2)
     ahead = ports.positions[family.first] + np.array(family.ahead) + there @ ports.static[family.waves, POSITION]
     turned = np.exp(2j * math.pi * np.arange(cycles.shape[1])[:, None, None] * ahead)

@@ -235,7 +235,7 @@ class MeshWaves:
         """
         meshes = self.assembly.meshes
         of_ring = [self.system.frame.ring_waves(m) > 0 for m in range(len(meshes.tilt))]
-        return meshes.tilt[:, [TILT_STIFFNESS, TILT_DAMPING, TILT_MOMENT]] * np.array(of_ring)[:, None]
+        return np.asarray(meshes.tilt[:, [TILT_STIFFNESS, TILT_DAMPING, TILT_MOMENT]] * np.array(of_ring)[:, None])
 
     @property
     def moving(self) -> Booleans:

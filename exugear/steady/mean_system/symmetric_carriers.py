@@ -131,8 +131,9 @@ def _rings(name: str, body: ReducedBody, planets: PlanetSet, axis: Sequence[floa
             c = math.cos(angle)
             s = math.sin(angle)
             place = np.array([c * first[0] - s * first[1], s * first[0] + c * first[1], first[2]])
-            near = min(left, key=lambda n, place=place: float(np.linalg.norm(places[n] - place)))
-            if np.linalg.norm(places[near] - place) > SAME_PLACE * radii[left[0]] or near in ring:
+            apart = np.linalg.norm(places[left] - place, axis=1)
+            near = left[int(np.argmin(apart))]
+            if apart.min() > SAME_PLACE * radii[left[0]] or near in ring:
                 raise SteadyError(
                     f"bodies.{name}: its seat {body.seats[left[0]].name} off the axis is not repeated at each of the "
                     f"{planets.waves} planets, so its stiffness is not constant in the fixed frame; set flexibility = "
@@ -153,7 +154,7 @@ def _turn_of_seats(body: ReducedBody, rings: Integers, planets: PlanetSet) -> Fl
     vectors = np.eye(BODY_SIZE)
     for first in (0, TILT):
         vectors[first : first + 2, first : first + 2] = [[c, -s], [s, c]]
-    turn = np.kron(np.eye(len(body.seats)), vectors)
+    turn = np.asarray(np.kron(np.eye(len(body.seats)), vectors), dtype=np.float64)
     for ring in rings:
         turn[ring.ravel()] = 0.0
         for here, there in zip(ring, np.roll(ring, -1, axis=0), strict=True):
