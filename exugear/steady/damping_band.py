@@ -31,6 +31,8 @@ MOST_PEAKS = 20
 """Highest peaks of each quantity that are solved again."""
 ABOUT = (0.0, -0.006, -0.003, -0.001, 0.001, 0.003, 0.006)
 """Speeds about a peak at which it is solved again, relative to its own, this one first."""
+ABOUT_WITH_RING = (0.0, -0.003, 0.003)
+"""The same with a flexible ring gear, where a solution takes a hundred times as long."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +76,8 @@ def damping_band(model: HarmonicBalanceModel, method: Method, speed: Floats, amp
     found = np.zeros((len(point), len(quantities), 2))
     respond = {"linear": linear_response, "parametric": parametric_response}[method]
     damped = [model.with_system(system) for system in damping_limits(model.system)]
-    solves = list(product(range(len(damped)), np.unique(point), ABOUT))
+    about = ABOUT_WITH_RING if model.waves.neighbours else ABOUT
+    solves = list(product(range(len(damped)), np.unique(point), about))
 
     def sizes_at(solve: tuple[int, int, float]) -> Floats:
         """Sizes (lines, s) of the quantities in one solution."""

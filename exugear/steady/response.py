@@ -358,7 +358,7 @@ def signals(model: HarmonicBalanceModel, response: Response) -> Complexes:
         deflection[0] += levers[:, -1]
     if model.shaft_orders.sidebands:
         deflection = deflection - model.deviations(interface.speed)
-    found = [of_motion, deflection, response.force]
+    found = [of_motion, deflection, response.force[:, model.waves.force_waves]]
     if model.radiated is not None:
         # A line of a coefficient c oscillates with the amplitude 2 c.
         velocity = model.radiated.surface_velocity(2.0 * response.motion, interface.frequencies)

@@ -38,7 +38,7 @@ from exugear.system.kernels.meshes import (
 from exugear.system.kernels.turning import travelling_tangent
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.line_of_action import CURVE_FORM, EXPONENT
-from fe_ste.tools.arrays import Booleans, Complexes, Floats
+from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
 
 SAMPLES = 64
 """Samples of each cubic piece of a stiffness for its Fourier coefficients: aliases are below 1e-7 of it."""
@@ -149,6 +149,12 @@ class MeshWaves:
     def planets(self, wave: MeshWave) -> PlanetSet | None:
         """Planets of the meshes of a wave, None of a single mesh."""
         return next(planets for meshes, planets in self.groups if wave.first in meshes)
+
+    @property
+    def force_waves(self) -> Integers:
+        """Waves from which the force of each planet's mesh follows: those of a flexible ring beyond repeat it."""
+        kept = [n for n, wave in enumerate(self.waves) if not wave.ahead or wave.wave < len(wave.ahead)]
+        return np.array(kept, dtype=np.int64)
 
     @cached_property
     def weights(self) -> Floats:

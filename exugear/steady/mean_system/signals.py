@@ -67,9 +67,9 @@ class SignalRows:
 
 
 def mesh_signal_names(waves: MeshWaves) -> tuple[SignalName, ...]:
-    """Names of transmission errors and forces of the meshes."""
+    """Names of transmission errors and forces of the meshes; forces of as many waves as there are planets."""
     errors = tuple(SignalName(f"mesh_dte {wave.name}", "mesh_dte", "m") for wave in waves.waves)
-    forces = tuple(SignalName(f"mesh_force {wave.name}", "mesh_force", "N") for wave in waves.waves)
+    forces = tuple(SignalName(f"mesh_force {waves.waves[n].name}", "mesh_force", "N") for n in waves.force_waves)
     return (*errors, *forces)
 
 
