@@ -140,7 +140,9 @@ def sidebands(data: xr.Dataset, peak: Peak, signal: str = "overall_dte", least: 
     bases = tuple(str(name) for name in data["base"].to_numpy())
     names = [str(name) for name in data["signal"].to_numpy()]
     values: Floats = data["amplitude"].to_numpy()[point, :, names.index(signal)].astype(np.float64)
-    carrying = int(np.argmax(np.abs(index[centre])))
+    # Passing planets are beside what a mesh excites, however many times they pass.
+    of_meshes = np.array([base != data.attrs.get("ring_carrier") for base in bases])
+    carrying = int(np.argmax(np.abs(index[centre]) * of_meshes))
     found = []
     for line in range(1, len(index)):
         # Lines are as good as their conjugates: the one whose multiple of the peak's base has the sign of the peak's.
