@@ -231,14 +231,15 @@ def contributions_of(context: Context, headline: Headline) -> Contributions | No
     if response is None or top is None or LAWS[headline.choice.mesh_model].loses_contact:
         return None
     orders = response["order"].to_numpy()
-    place = int(np.argmin(np.abs(orders - top.order)))
-    if np.count_nonzero(response["index"].to_numpy()[place]) != 1:
+    multiples = response["index"].to_numpy()[int(np.argmin(np.abs(orders - top.order)))]
+    if np.count_nonzero(multiples) != 1:
         return None
     settings = settings_of(response.attrs)
     assembly = context.assembled(headline.choice)
     model = harmonic_balance_model(assembly, settings.speeds.values, settings.harmonics, settings.combinations)
-    speed = loudest_near(model, top.speed, 0.2 * SAME_SPEED, place)
-    return contributions(model, speed, place)
+    line = int(model.lines.find(multiples)[0])
+    speed = loudest_near(model.frozen, top.speed, 0.2 * SAME_SPEED, line)
+    return contributions(model.frozen, speed, line)
 
 
 def causes_of(
