@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from exugear.gearbox.named_files import LARGEST_TABLE
-from exugear.gearbox.parts import Bearing, Body, Coupling, DampingTimes, Joint, LoadCase, PointForce, TorqueOrder
+from exugear.gearbox.parts import Bearing, Body, Coupling, DampingTimes, Joint, LoadCase, PointForce, VaryingLoad
 from exugear.gearbox.reading import Origin, part_of_each, parts_of_each
 from exugear.gearbox.sections.bodies import BodySection, InertiaSection
-from exugear.gearbox.sections.case import DampingSection, ExcitationSection, ForceSection, GearboxFile, LoadCaseSection
+from exugear.gearbox.sections.case import DampingSection, ForceSection, GearboxFile, LoadCaseSection
 from exugear.gearbox.sections.connections import (
     BearingSection,
     ConnectorDampingSection,
@@ -19,6 +20,7 @@ from exugear.gearbox.sections.connections import (
     StiffnessSection,
 )
 from exugear.gearbox.sections.entries import GROUND
+from exugear.gearbox.sections.excitations import ExcitationSection
 from exugear.gearbox.sections.gears import GearSection, PinSection
 from exugear.gearbox.units import MM, RPM, UM, optional_si, si
 from fe_ste.geometry.cylinders import MassProperties, Tube, mass_properties, together
@@ -451,33 +453,67 @@ def point_forces(origin: Origin, bodies: Mapping[str, Body]) -> tuple[PointForce
     return parts_of_each(convert_section, origin.case.forces)
 
 
-def torque_orders(origin: Origin, bodies: Mapping[str, Body]) -> tuple[TorqueOrder, ...]:
-    """Torques on enabled bodies that vary with their angle, order by order.
+def varying_loads(origin: Origin, bodies: Mapping[str, Body]) -> tuple[VaryingLoad, ...]:
+    """Forces and moments on enabled bodies that vary with their angle, order by order.
 
     Raises
     ------
     GearboxFileError
-        A torque acts on the ground, on a body that does not rotate, on a planet, or on an unknown body.
+        A load acts on the ground, on a body that does not rotate or is unknown, or a force or an unbalance on a body
+        without a position.
     """
 
-    def convert_section(name: str, section: ExcitationSection) -> tuple[TorqueOrder, ...]:
+    def convert_section(name: str, section: ExcitationSection) -> tuple[VaryingLoad, ...]:
         key = f"excitations.{name}"
-        if section.body == GROUND or not origin.are_enabled(key, section.body) or not section.enabled:
-            if section.body == GROUND:
-                raise origin.error(f"{key}.body = {GROUND!r}: a torque on the ground has no effect; set a moving body")
+        if section.body == GROUND:
+            raise origin.error(f"{key}.body = {GROUND!r}: a load on the ground has no effect; set a moving body")
+        loaded = [bodies[section.body]] if section.body in bodies else []
+        if not loaded and origin.are_enabled(key, section.body):
+            loaded = [body for body in bodies.values() if body.family == section.body]  # a set of planets
+        if not section.enabled:
             return ()
-        if origin.case.bodies[section.body].carrier is not None or bodies[section.body].fixed:
-            raise origin.error(
-                f"{key}.body = {section.body!r}: a planet or a fixed body cannot have a varying torque; set a rotating "
-                "body on a fixed axis"
-            )
-        phases = section.phase_deg or (0.0,) * len(section.orders)
-        return tuple(
-            TorqueOrder(name, section.body, order * section.pole_pairs, amplitude, math.radians(phase))
-            for order, amplitude, phase in zip(section.orders, section.torque_N_m, phases, strict=True)
-        )
+        return tuple(load for body in loaded for load in _loads_on(origin, name, section, body))
 
     return parts_of_each(convert_section, origin.case.excitations)
+
+
+def _loads_on(origin: Origin, name: str, section: ExcitationSection, body: Body) -> Iterator[VaryingLoad]:
+    """Yield the loads of an excitation on one body, order by order."""
+    key = f"excitations.{name}"
+    if body.fixed:
+        raise origin.error(f"{key}.body = {section.body!r}: a fixed body has no angle; set a rotating body")
+    if section.z_mm is not None and body.spin_only:
+        raise origin.error(
+            f"{key}.z_mm: {section.body!r} is a spin-only body, which takes torques only; remove z_mm, forces, moments "
+            "and unbalance, or give the body a position"
+        )
+    position = None if section.z_mm is None else _position(body, section.z_mm)
+    if section.unbalance_g_mm is not None:
+        unbalance = si(section, "unbalance_g_mm") * _phasor(section, 0)
+        yield VaryingLoad(name, body.name, 1, position, (unbalance, -1j * unbalance, 0j, 0j, 0j, 0j), 2.0)
+        return
+    for n, order in enumerate(section.orders):
+        yield VaryingLoad(name, body.name, order * section.pole_pairs, position, _wrench(section, n))
+
+
+def _phasor(section: ExcitationSection, n: int) -> complex:
+    """Factor exp(i phi) of the n-th order of an excitation."""
+    return cmath.rect(1.0, math.radians(section.phase_deg[n]) if section.phase_deg else 0.0)
+
+
+def _wrench(section: ExcitationSection, n: int) -> tuple[complex, complex, complex, complex, complex, complex]:
+    """Complex force (N) and moment (N m) of the n-th order of an excitation, as `VaryingLoad` has it."""
+    phasor = _phasor(section, n)
+    sense = {"fixed": 0, "rotating": 1, "counter_rotating": -1}[section.direction]
+
+    def turned(x: float, y: float) -> tuple[complex, complex]:
+        # (x, y) turned by an angle a is (x cos a - y sin a, x sin a + y cos a).
+        return (x + sense * 1j * y) * phasor, (y - sense * 1j * x) * phasor
+
+    x, y, z = section.force_N[n] if section.force_N else (0.0, 0.0, 0.0)
+    moment = section.moment_N_m[n] if section.moment_N_m else (0.0, 0.0)
+    torque = section.torque_N_m[n] if section.torque_N_m else 0.0
+    return (*turned(x, y), z * phasor, *turned(*moment), torque * phasor)
 
 
 def couplings(origin: Origin, spinning: Sequence[str], bearing_names: Sequence[str]) -> tuple[Coupling, ...]:

@@ -498,7 +498,7 @@ CHECKS = (
     Check("joints", None, ("bodies_by_inertias",)),
     Check("mounts", None, ("bodies_by_inertias",)),
     Check("forces", None, ("bodies_by_inertias",)),
-    Check("torque_orders", None, ("bodies_by_inertias",)),
+    Check("varying_loads", None, ("bodies_by_inertias",)),
     Check("load_cases", None, ("bodies_by_inertias",)),
     Check("pin_offsets", None, ("bodies_by_inertias",)),
     Check("blanks", errors_of_blanks, ("bearings", "mounts", "forces")),

@@ -175,7 +175,7 @@ def check_deviations(gearbox: Gearbox, method: Method) -> None:
     SteadyError
         The gearbox file has deviations or excitations, and the method is ``nonlinear``.
     """
-    if (gearbox.deviations or gearbox.torque_orders) and method == "nonlinear":
+    if (gearbox.deviations or gearbox.varying_loads) and method == "nonlinear":
         raise SteadyError(
             "deviations, excitations: the method nonlinear does not include the orders of the shafts; use --method "
             "parametric with --mesh-model line_of_action, or exugear run"

@@ -102,6 +102,9 @@ AngleDeg = Annotated[float, Range(-3600.0, 3600.0, (-720.0, 720.0))]
 ShaftOrder = Annotated[int, Range(1, 2000, (1, 500), "periods per revolution, a whole number")]
 PolePairs = Annotated[int, Range(1, 200, (1, 60))]
 RippleNm = Annotated[float, Range(0.0, 1e9, (0.0, 1e7), "amplitude, zero to peak")]
+UnbalanceGMm = Annotated[
+    float, Range(1e-9, 1e13, (1e-3, 1e10), "mass times distance; 1 kg mm are 1000 g mm, 1 kg m are 1e6 g mm")
+]
 Phase = Annotated[float, _symmetric_range(1000.0, 10.0, "in mesh cycles")]
 
 # Masses, from watch gears to the rotors of hydro generators.

@@ -176,9 +176,9 @@ class Labels:
         return f"the {ordinal} of the mesh {mesh}"
 
     def _rotation_sentence(self, order: int, body: str, carrier: str | None) -> str:
-        """Return an order of a body's rotation as a noun phrase, with the torques of the file that have this order."""
-        torques = [own.excitation for own in self._gearbox.torque_orders if (own.body, own.order) == (body, order)]
-        causes = f" (excitation {', '.join(map(self.of, torques))})" if torques else ""
+        """Return an order of a body's rotation as a noun phrase, with the excitations of the file at this order."""
+        loads = [own.excitation for own in self._gearbox.varying_loads if (own.body, own.order) == (body, order)]
+        causes = f" (excitation {', '.join(map(self.of, dict.fromkeys(loads)))})" if loads else ""
         ordinal = {1: "1st", 2: "2nd", 3: "3rd"}.get(order, f"{order}th")
         frame = f" in {self.of(carrier)}" if carrier else ""
         return f"the {ordinal} order of the rotation of {self.of(body)}{frame}{causes}"

@@ -66,7 +66,12 @@ def _with_errors(grc: dict[str, Any]) -> dict[str, Any]:
     }
     case["pins"] = {"first": {"body": "planet_1", "radial_um": 30.0, "tangential_um": -40.0}}
     ripple = {"body": "hss", "orders": [6, 12], "torque_N_m": [30.0, 12.0], "phase_deg": [0.0, 45.0], "pole_pairs": 2}
-    case["excitations"] = {"ripple": ripple | {"enabled": True, "description": "generator"}}
+    blades = {"body": "lss", "z_mm": 200.0, "orders": [3], "force_N": [[50.0, 0.0, 9.0]], "moment_N_m": [[4.0, 0.0]]}
+    case["excitations"] = {
+        "ripple": ripple | {"enabled": True, "description": "generator"},
+        "blades": blades | {"direction": "fixed"},
+        "unbalance": {"body": "planet_1", "z_mm": 100.0, "unbalance_g_mm": 500.0},
+    }
     case["bodies"]["main_shaft"]["enabled"] = True
     case["ste"] = {"positions": 20, "grid": True, "torque_factors": [0.5, 1.0], "misalignment_um": [0.0, 30.0]}
     return case
