@@ -337,7 +337,7 @@ class Gearbox(ReprMixin):
     @cached_property
     def varying_loads(self) -> tuple[VaryingLoad, ...]:
         """Forces and moments on bodies that vary with their angle, order by order."""
-        return body_parts.varying_loads(self._origin, self.named_bodies)
+        return body_parts.varying_loads(self._origin, self.named_bodies, lambda body: self.train.static_torques[body])
 
     @cached_property
     def couplings(self) -> tuple[Coupling, ...]:

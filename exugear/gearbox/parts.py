@@ -166,10 +166,12 @@ class VaryingLoad:
     """Periods n per revolution of the body."""
     position: tuple[float, float, float] | None
     """(3,) place at zero angles, m; None for a torque, which acts where constant torques do."""
-    wrench: tuple[complex, complex, complex, complex, complex, complex]
-    """w: force along x, y, z (N s^p), moment about x, y, z (N m s^p), zero to peak."""
+    wrench: tuple[complex, ...]
+    """(6,) w: force along x, y, z (N s^p), moment about x, y, z (N m s^p), zero to peak."""
     exponent: float = 0.0
     """p, of the speed in rad/s."""
+    reaction_on: str | None = None
+    """Body on which the opposite load acts at the same place."""
     curve: tuple[tuple[float, float, float], ...] = ()
     """Instead of the power: rows of speed (rad/s), ascending, with factor on w and phase (rad), linear in between."""
 

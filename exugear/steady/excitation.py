@@ -49,7 +49,7 @@ from exugear.steady.mean_system.mesh_places import (
     mesh_ports,
 )
 from exugear.steady.mean_system.mesh_waves import MeshWaves, mesh_waves
-from exugear.steady.mean_system.shaft_orders import ShaftOrders, at_lines
+from exugear.steady.mean_system.shaft_orders import Places, ShaftOrders, at_lines
 from exugear.steady.mean_system.signals import (
     AXES,
     SURFACE_VELOCITY,
@@ -609,7 +609,7 @@ class HarmonicBalanceModel:
         return np.array([tooth_friction(self.waves, self.lines, self.ports_at(s), s, self.harmonics) for s in speeds])
 
     @cached_property
-    def _shaft_places(self) -> tuple[Integers, Booleans]:
+    def _shaft_places(self) -> Places:
         """Places of the terms of the orders of shafts among the lines."""
         return self.shaft_orders.places(self.lines, len(self.waves.base_orders))
 
@@ -619,7 +619,7 @@ class HarmonicBalanceModel:
         if not orders.sidebands:
             return np.zeros((len(self.lines.index), self.system.size), dtype=complex)
         counted = np.array([source in (None, name) for name in orders.source])
-        reaction = orders.reaction_at(speed) * counted[:, None]
+        reaction = orders.reaction_at(speed, self.system.static_at(speed)) * counted[:, None]
         return at_lines(reaction, self._shaft_places, len(self.lines.index), speed)
 
     @cached_property

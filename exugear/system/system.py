@@ -340,7 +340,15 @@ class Assembly(ReprMixin):
     def varying_loads(self) -> VaryingLoadArrays:
         """Loads of the gearbox file that vary with the angle of a body."""
         loads = self.gearbox.varying_loads
-        entries = [self._entries(load.excitation, load.body, load.position, np.array(load.wrench)) for load in loads]
+        entries = []
+        for load in loads:
+            index, values = self._entries(load.excitation, load.body, load.position, np.array(load.wrench))
+            if load.reaction_on is not None:
+                other, opposite = self._entries(
+                    load.excitation, load.reaction_on, load.position, -np.array(load.wrench)
+                )
+                index, values = np.append(index, other), np.append(values, opposite)
+            entries.append((index, values))
         waves = np.concatenate([np.zeros(0, dtype=complex), *(values for _, values in entries)])
         rows = [row for load in loads for row in load.curve]
         return VaryingLoadArrays(
@@ -590,6 +598,8 @@ def input_hash(assembly: Assembly, load_case: str | None = None) -> str:
             if element.table is not None
         },
     }
+    if curves := [load.curve for load in gearbox.varying_loads if load.curve]:
+        content["excitation_tables"] = [[[f"{value:.9g}" for value in row] for row in curve] for curve in curves]
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 

@@ -17,6 +17,7 @@ from exugear.gearbox.load_cases import (
     load_in_words,
     other_load_warning,
     summarise_loads,
+    table_speed_warning,
     torque_series,
 )
 from exugear.gearbox.parts import LoadCase
@@ -119,6 +120,8 @@ def prepare_start(plan: RunPlan, resume: bool) -> RunStart:
 
     Raises
     ------
+    GearboxFileError
+        The table of an excitation does not cover the speeds of the load case.
     RunError
         There is nothing to resume, it was run with other choices, or was stopped for good.
     """
@@ -127,6 +130,8 @@ def prepare_start(plan: RunPlan, resume: bool) -> RunStart:
     gearbox = assembly.gearbox
     series = torque_series(gearbox, case)
     summary = summarise_loads(gearbox, case, assembly.inertias, plan.duration, series)
+    if beyond := table_speed_warning(gearbox, summary):
+        raise gearbox.error(beyond)
     judge = ValidityMonitor(assembly, summary)
     layout = signal_layout(assembly)
     if resume:

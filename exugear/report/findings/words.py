@@ -31,7 +31,7 @@ DESCRIBED_ENERGY, MIN_ENERGY = 0.8, 0.1
 SHOWN_ELEMENTS = 2
 """Maximum number of elements in a strain energy list."""
 _HARMONIC = re.compile(r"(?:(\d+) × )?[^ ]+")
-_ROTATION = re.compile(r"(?:(\d+) × )?rotation of (\S+)(?: in (\S+))?")
+_ROTATION = re.compile(r"(?:(\d+) × )?(half )?rotation of (\S+)(?: in (\S+))?")
 _COPY = re.compile(r"^(.*)_(\d+)$")
 _OF = re.compile(r"(?<= of )\w+")
 _NAME = re.compile(r"\w+(?:-\w+)*")
@@ -168,20 +168,23 @@ class Labels:
     def line_sentence(self, line: OrderLine) -> str:
         """Return an order as a noun phrase, such as "the 2nd harmonic of the mesh high-speed"."""
         if rotation := _ROTATION.fullmatch(line.name):
-            return self._rotation_sentence(int(rotation[1] or 1), *rotation.groups()[1:])
+            times = int(rotation[1] or 1) * (0.5 if rotation[2] else 1.0)
+            return self._rotation_sentence(times, *rotation.groups()[2:])
         if _HARMONIC.fullmatch(line.name) is None:
             return f"the combination {self.labelled(line.name)}"
         harmonic, mesh = self._split(line)
         ordinal = {1: "mesh frequency", 2: "2nd harmonic", 3: "3rd harmonic"}.get(harmonic, f"{harmonic}th harmonic")
         return f"the {ordinal} of the mesh {mesh}"
 
-    def _rotation_sentence(self, order: int, body: str, carrier: str | None) -> str:
+    def _rotation_sentence(self, order: float, body: str, carrier: str | None) -> str:
         """Return an order of a body's rotation as a noun phrase, with the excitations of the file at this order."""
         loads = [own.excitation for own in self._gearbox.varying_loads if (own.body, own.order) == (body, order)]
         causes = f" (excitation {', '.join(map(self.of, dict.fromkeys(loads)))})" if loads else ""
-        ordinal = {1: "1st", 2: "2nd", 3: "3rd"}.get(order, f"{order}th")
+        ordinal = {1.0: "1st order", 2.0: "2nd order", 3.0: "3rd order"}.get(order, f"{order:g}th order")
+        if order % 1.0:
+            ordinal = f"order {order:g}"
         frame = f" in {self.of(carrier)}" if carrier else ""
-        return f"the {ordinal} order of the rotation of {self.of(body)}{frame}{causes}"
+        return f"the {ordinal} of the rotation of {self.of(body)}{frame}{causes}"
 
     def pairs(self, line: OrderLine) -> tuple[int, list[str]]:
         """Return the harmonic of an order and the families of the meshes that excite it; none for a combination."""

@@ -21,6 +21,7 @@ import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -69,34 +70,49 @@ class ShaftOrders:
     """(t,) stated load of a term, -1 for deviations."""
     speeds: Floats = field(default_factory=lambda: np.zeros(0))
     """(l,) speed of the body of each stated load over that of the input."""
+    angles: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    """(l, size) angle of that body by the static deflections, at zero angle of the input."""
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the rotations."""
         return tuple(rotation.name for rotation in self.rotations)
 
-    def reaction_at(self, speed: float) -> Complexes:
-        """Generalized forces (t, size) at a speed of the input, rad/s."""
+    def reaction_at(self, speed: float, static: Floats) -> Complexes:
+        """Generalized forces (t, size) at a speed of the input (rad/s) and static deflections (size,)."""
         factors = np.ones(len(self.load), dtype=complex)
+        angles = self.loads.order * (self.angles @ static) if len(self.angles) else np.zeros(0)
         for n in np.unique(self.load[self.load >= 0]).tolist():
-            factors[self.load == n] = cmath.rect(*size_and_phase(n, speed * self.speeds[n], self.loads))
+            size, phase = size_and_phase(n, speed * self.speeds[n], self.loads)
+            factors[self.load == n] = cmath.rect(size, phase + angles[n])
         return np.asarray(self.reaction * factors[:, None])
 
-    def places(self, lines: LineSet, meshes: int) -> tuple[Integers, Booleans]:
-        """Places (t,) of the terms in lines of which `meshes` bases are meshes, and which count as conjugates there."""
+    def places(self, lines: LineSet, meshes: int) -> Places:
+        """Places of the terms in lines of which `meshes` bases are meshes."""
         multiples = np.zeros((len(self.multiples), lines.index.shape[1]), dtype=np.int64)
         multiples[:, meshes:] = self.multiples
-        return lines.find(multiples)
+        place, mirrored = lines.find(multiples)
+        return Places(place, mirrored, (place == 0) & multiples.any(axis=1))
 
 
-def at_lines(values: Complexes, places: tuple[Integers, Booleans], lines: int, speed: float) -> Complexes:
+class Places(NamedTuple):
+    """Places of terms among lines."""
+
+    line: Integers
+    mirrored: Booleans
+    """(t,) line of a term, -1 for none, and whether the term counts as its conjugate there."""
+    halved: Booleans
+    """(t,) whether a term of opposite rotations stands still, so that it counts with its conjugate."""
+
+
+def at_lines(values: Complexes, places: Places, lines: int, speed: float) -> Complexes:
     """Sum up terms (t, ...) at the places of a number of lines (lines, ...); for a negative speed their conjugates."""
     found = np.zeros((lines, *values.shape[1:]), dtype=complex)
-    place, mirrored = places
     values = values if speed > 0.0 else values.conj()
-    there = place >= 0
-    turned = np.where(mirrored[:, None], values.conj(), values)
-    np.add.at(found, place[there], turned[there])
+    there = places.line >= 0
+    turned = np.where(places.mirrored[:, None], values.conj(), values)
+    turned = np.where(places.halved[:, None], 2.0 * turned.real, turned)
+    np.add.at(found, places.line[there], turned[there])
     return found
 
 
@@ -189,8 +205,7 @@ class _Series:
         arrays = self.assembly.varying_loads
         entries = slice(arrays.first[number], arrays.first[number + 1])
         wave = np.zeros(self.assembly.size, dtype=complex)
-        wave[arrays.coordinate[entries]] = arrays.wave[entries] @ (1.0, 1j)
-        wave *= 0.5 * cmath.exp(1j * load.order * self.still[arrays.turning[number]])
+        wave[arrays.coordinate[entries]] = arrays.wave[entries] @ (0.5, 0.5j)
         for key, turned in self._in_frame(load.body, load.order, wave):
             self._add(self.displacement, (number, key), np.zeros(len(self.waves.waves), dtype=complex))
             self._add(self.reaction, (number, key), turned)
@@ -243,6 +258,7 @@ class _Series:
             self.assembly.varying_loads,
             np.array([n for n, _ in self.displacement], dtype=np.int64),
             np.array([self.frame.speeds.get(load.body, 0.0) for load in loads]),
+            self.frame.matrices(0.0)[0][self.assembly.varying_loads.turning],
         )
 
     def _wheel(self, mesh: int, end: int) -> tuple[str, int]:

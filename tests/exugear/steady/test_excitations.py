@@ -111,7 +111,7 @@ def test_resonances_of_a_ripple_are_looked_for_even_where_the_mesh_does_not_vary
         ({"body": "nowhere"}, "excitations.ripple: no body 'nowhere'"),
         ({"body": "ground"}, "excitations.ripple.body = 'ground': a load on the ground has no effect"),
         ({"orders": [0, 6]}, "excitations.ripple.orders"),
-        ({"orders": [1.5, 6]}, "excitations.ripple.orders"),
+        ({"orders": [1.25, 6]}, "excitations.ripple: orders: 1.25 is neither a whole number nor a half"),
         ({"torque_N_m": [1.0]}, "set as many torque_N_m as orders: 1 for 2 orders"),
         ({"phase_deg": [1.0]}, "set as many phase_deg as orders: 1 for 2 orders"),
         ({"torque_N_m": [1.0, float("nan")]}, "excitations.ripple.torque_N_m"),

@@ -17,6 +17,7 @@ from exugear.system.build import assemble
 from exugear.system.loads import LoadTable
 from exugear.system.system import Assembly
 
+from ..cases import gear_trains
 from ..cases.both_ways import compiled_states, exudyn_states
 from ..cases.spur import SPUR_CASE
 from ..cases.steady_runs import fitted, solver_of
@@ -53,7 +54,7 @@ def motion_at(solver: PointSolver, speed: float, order: float = 1.0) -> np.ndarr
 
 @pytest.mark.parametrize("radial_y", [STIFFNESS, 1.5e7])
 def test_a_jeffcott_rotor_whirls_as_in_closed_form(radial_y):
-    """x = m e Omega^2 / (k_x - m Omega^2 + i Omega c), y = -i m e Omega^2 / (k_y - ...), on bearings of any stiffness."""
+    """x = m e Omega^2 / (k_x - m Omega^2 + i Omega c), y = -i m e Omega^2 / (k_y - ...), also where k_x is not k_y."""
     solver = solver_of(rotor(UNBALANCE, radial_y), SPEEDS, "linear", 1)
     for speed in SPEEDS_AROUND:
         w = abs(speed)
@@ -95,6 +96,85 @@ def test_a_rotating_force_that_grows_with_the_square_of_the_speed_is_an_unbalanc
     as_force = motion_at(solver_of(rotor(force | {"phase_deg": [30.0]}), SPEEDS, "linear", 1), 2500.0)
     as_unbalance = motion_at(solver_of(rotor(UNBALANCE | {"z_mm": 40.0}), SPEEDS, "linear", 1), 2500.0)
     np.testing.assert_allclose(as_force, as_unbalance, rtol=1e-9)
+
+
+def residual_in_space(assembly: Assembly, speed: float) -> float:
+    """Largest difference of inertia from forces at five instants, by the response to stated loads, over these loads.
+
+    All equations of motion of the assembly with the mean stiffness of the meshes, in which planets orbit and turn.
+    """
+    solver = solver_of(assembly, (0.5 * speed, 1.5 * speed), "linear", 1)
+    frame = solver.model.system.frame
+    response = solver.response(speed).interface.loads
+    assert response is not None
+    loads = LoadTable(varying=assembly.varying_loads)
+    still = solver.model.system.static_at(speed)
+    w = 1j * speed * solver.model.lines.orders[1:, None]
+
+    def missing(psi: float, motion: np.ndarray, with_loads: bool) -> np.ndarray:
+        waves = 2.0 * motion[1:] * np.exp(w * psi / speed)
+        moved = (waves.sum(axis=0).real, (w * waves).sum(axis=0).real, (w**2 * waves).sum(axis=0).real)
+        q, v, a = frame.state(psi, speed, still + moved[0], moved[1], moved[2])
+        applied = loads.generalized(assembly, 0.0, q, v) if with_loads else 0.0
+        return assembly.inertia_forces(q, v, a) - assembly.forces(q, v, frame.mean_meshes) - applied
+
+    worst = 0.0
+    for psi in (0.0, 0.4, 1.7, 3.0, 5.5):
+        left = missing(psi, response.motion, True) - missing(psi, np.zeros_like(response.motion), False)
+        q, v, _ = frame.state(psi, speed, still)
+        applied = loads.generalized(assembly, 0.0, q, v)
+        worst = max(worst, np.abs(left).max() / np.abs(applied).max())
+    return worst
+
+
+@pytest.mark.parametrize(("body", "orders"), [("planet_2", 3), ("planet", 3), ("carrier", 1), ("lss", 1), ("hss", 1)])
+def test_the_response_to_an_unbalance_fulfils_the_equations_in_space(grc, stiffness, body, orders):
+    """One planet's unbalance has its order and those one rotation of the carrier beside it; all planets' the same.
+
+    What is left is of second order in the motion, which turns the static forces, and in the static deflection.
+    """
+    unbalance = {"body": body, "z_mm": -50.0 if body != "hss" else 300.0, "unbalance_g_mm": 1e3, "phase_deg": [20.0]}
+    gearbox = grc.varied({"excitations": {"unbalance": unbalance}})
+    assembly = assemble(gearbox, Choice("bushing"), stiffness)
+    speed = 10.0 if body != "hss" else 1.0
+    terms = solver_of(assembly, (0.5 * speed, 1.5 * speed), "linear", 1).model.shaft_orders.multiples
+    assert len(np.unique(terms, axis=0)) == orders
+    left = residual_in_space(assembly, speed)
+    assert left < 1e-3
+
+
+@pytest.mark.parametrize("order", [1, 3])
+def test_a_planet_on_a_heavy_carrier_moves_as_in_closed_form(order):
+    """A load F of an order n of planet 2 in space: z = F / (k - m w^2 - k^2 / (k + k_c - M w^2)), wherever it orbits.
+
+    The bearing k on the carrier of 1e7 kg; beside the carrier's mass that of the other planets is below 1e-6.
+    """
+    content = gear_trains.planetary("ring")
+    content["static_load"]["torques_N_m"] = {"sun": 1e-9}
+    content["bodies"]["carrier"]["inertia"]["discs"] |= {"mass_kg": 1e7, "axial_kg_m2": 1e7, "transverse_kg_m2": 1e7}
+    force = {"body": "planet_2", "z_mm": 0.0, "orders": [order], "force_N": [[100.0, 40.0, 0.0]], "phase_deg": [50.0]}
+    content |= {"excitations": {"force": force}, "damping": {"bearing_time_s": 0.0}}
+    gearbox = Gearbox.from_dict(content)
+    assembly = assemble(gearbox, Choice("bushing"), dict.fromkeys(gearbox.pairs, np.array([1.0])))
+    solver = solver_of(assembly, (500.0, 3000.0), "linear", 1)
+    model, speed = solver.model, 1000.0
+    frame = model.system.frame
+    motion = solver.response(speed).interface.loads.motion
+    turning = frame.speeds["planet_2"]
+    w = order * abs(turning) * speed
+    # Centrifugal forces move the planets outwards, and their teeth turn them a little.
+    turned = frame.state(0.0, speed, model.system.static_at(speed))[0][assembly.spin["planet_2"]]
+    phasor = np.exp(1j * (np.radians(50.0) + order * turned))
+    carrier = 2e8 - 1e7 * w**2
+    amplitude = np.array([100.0, 40.0]) * phasor / (2e8 - 0.8 * w**2 - 2e8**2 / (2e8 + carrier))
+    found, expected = [], []
+    for psi in np.linspace(0.0, 20.0, 9):
+        waves = 2.0 * motion[1:] * np.exp(1j * model.lines.orders[1:, None] * psi)
+        moved = frame.matrices(psi)[0] @ (motion[0].real + waves.sum(axis=0).real)
+        found.append(moved[list(assembly.coordinates["planet_2"][:2])])
+        # A load against the sense of the input is the conjugate of that along it.
+        expected.append((amplitude if turning > 0.0 else amplitude.conj()) * np.exp(1j * order * abs(turning) * psi))
+    np.testing.assert_allclose(found, np.real(expected), rtol=0.0, atol=1e-6 * np.abs(expected).max())
 
 
 def geared(**changes: Any) -> Assembly:
