@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -257,3 +258,52 @@ def test_a_table_that_does_not_cover_the_speeds_is_refused_in_both(tmp_path):
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 2
     assert "load_cases.run_up: excitations.ripple.table: covers 400 to 1500 rpm" in " ".join(result.output.split())
+
+
+def answer(folder: Path, *options: str) -> dict[str, Any]:
+    """Summary of the command steady for two excitations and a gear that hardly varies."""
+    case = content(orders=[12], torque_percent=[1.0])
+    case["pairs"]["spur"]["stiffness"] = {"mean_N_per_m": 3e8, "cosine_N_per_m": [2e6]}
+    case["excitations"]["imbalance"] = {"body": "shaft_2", "z_mm": 30.0, "unbalance_g_mm": 300.0}
+    (folder / "gearbox.toml").write_text(toml_text(case), encoding="utf-8")
+    arguments = ["steady", "gearbox.toml", "--speeds", "300:3000", "--points", "40", "--json", "--out", "results"]
+    result = CliRunner().invoke(app, [*arguments, *options])
+    assert result.exit_code == 0, result.output
+    found: dict[str, Any] = json.loads(result.stdout)
+    return found
+
+
+def test_the_ranking_blames_an_excitation_and_does_without_it(tmp_path, monkeypatch):
+    """Twelve torques per revolution pass 125 Hz at 627 rpm, the mesh with 20 teeth at 376 rpm."""
+    monkeypatch.chdir(tmp_path)
+    found = answer(tmp_path)
+    first = found["resonances"][0]
+    assert first["line"] == "12 x rotation of shaft_1"
+    assert first["speed_rpm"] == pytest.approx(627.0, rel=0.01)
+    sources = next(own for own in found["sources_of_overall_dte"] if abs(own["speed"] - 627.0 * np.pi / 30.0) < 1.0)
+    assert sources["meshes"]["ripple"] == pytest.approx(1.0, abs=1e-6)
+    without = answer(tmp_path, "--without", "ripple")
+    assert without["resonances"][0]["line"] == "spur"
+    assert not any("shaft_1" in own["line"] for own in without["resonances"])
+    both = answer(tmp_path, "--without", "ripple", "--without", "imbalance")
+    assert both["sources_of_overall_dte"] == []
+
+
+def test_leaving_out_what_is_not_there_is_bad_input(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "gearbox.toml").write_text(toml_text(content(orders=[12], torque_percent=[1.0])), encoding="utf-8")
+    for command in ("steady", "run"):
+        result = CliRunner().invoke(app, [command, "gearbox.toml", "--without", "rippel"])
+        assert result.exit_code == 2
+        assert "--without rippel: no such excitation; choose one of: ripple" in " ".join(result.output.split())
+    assert not (tmp_path / "results").exists()
+
+
+def test_the_terminal_names_the_excitation_of_an_order(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    answer(tmp_path)
+    arguments = ["steady", "gearbox.toml", "--speeds", "300:3000", "--points", "40", "--out", "results", "--all"]
+    said = " ".join(CliRunner().invoke(app, arguments).stdout.split())
+    assert "12 × rotation of shaft_1 (ripple)" in said
+    assert "Sources of the transmission error at resonances" in said
+    assert "ripple 100 %" in said
