@@ -125,10 +125,7 @@ class Interface:
     @cached_property
     def deflection(self) -> Complexes:
         """Deflections (n, m, m, f) under a unit of each force."""
-        rows, (lines, size, *loads) = self.ports.readings[:, DEFLECTION], self.motion.shape
-        # A row's numbers are real: so are the products with both parts of the motion.
-        found = rows @ self.motion.view(np.float64).reshape(lines, size, -1)
-        return np.asarray(found.view(np.complex128).reshape(lines, len(rows), *loads))
+        return _taken(self.ports.readings[:, DEFLECTION], self.motion)
 
     @cached_property
     def deflection_per_force(self) -> Complexes:
@@ -144,11 +141,20 @@ class Interface:
 
     def read(self, motion: Complexes) -> Complexes:
         """Find what the laws read (n, m, r, ...) of a motion (n, size, ...)."""
-        found = np.moveaxis(np.tensordot(self.ports.readings, motion, axes=(2, 1)), 2, 0)
+        found = _taken(self.ports.readings, motion)
         if self.ports.rates is not None:
             moving = 1j * self.frequencies.reshape(-1, *(1,) * (motion.ndim - 1)) * motion
-            found = found + np.moveaxis(np.tensordot(self.ports.rates, moving, axes=(2, 1)), 2, 0)
-        return np.ascontiguousarray(found)
+            found += _taken(self.ports.rates, moving)
+        return found
+
+
+def _taken(rows: Floats, motion: Complexes) -> Complexes:
+    """Products (n, ..., ...) of rows (..., size) with a motion (n, size, ...)."""
+    lines, size, *loads = motion.shape
+    # A row's numbers are real: so are the products with both parts of the motion.
+    parts = np.ascontiguousarray(motion).view(np.float64).reshape(lines, size, -1)
+    found = np.ascontiguousarray(rows).reshape(-1, size) @ parts
+    return np.asarray(found.view(np.complex128).reshape(lines, *rows.shape[:-1], *loads))
 
 
 @dataclass(frozen=True)
