@@ -46,7 +46,7 @@ class LoadTable:
     @property
     def is_constant(self) -> bool:
         """Return whether the generalized forces are constant."""
-        return self.drive is None and not self.series and self.varying is None
+        return self.drive is None and not self.series and (self.varying is None or not self.varying.turning.size)
 
     def torque(self, body: str, t: float) -> float:
         """Torque of the time series of a body at a time (s), N m."""
