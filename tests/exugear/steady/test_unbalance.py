@@ -18,9 +18,11 @@ from exugear.system.loads import LoadTable
 from exugear.system.system import Assembly
 
 from ..cases import gear_trains
+from ..cases.assembled import assembled
 from ..cases.both_ways import compiled_states, exudyn_states
 from ..cases.spur import SPUR_CASE
 from ..cases.steady_runs import fitted, solver_of
+from ..system.test_point_forces import content
 
 MASS, TRANSVERSE, POLAR = 1.0, 1e-2, 4e-3
 STIFFNESS, DAMPING, TILTING = 2e7, 400.0, 1e5
@@ -244,3 +246,17 @@ def test_a_spin_only_body_takes_no_unbalance():
     content["excitations"] = {"unbalance": UNBALANCE | {"body": "rotor"}}
     with pytest.raises(GearboxFileError, match="z_mm: 'rotor' is a spin-only body, which takes torques only"):
         Gearbox.from_dict(content)
+
+
+def test_a_flexible_shaft_has_a_seat_where_its_unbalance_acts():
+    """The force of 50 g mm at 200 rad/s is along x at the seat, without a moment about it."""
+    case = content(elastic=True)
+    del case["forces"]
+    case["excitations"] = {"balance": {"body": "shaft_1", "z_mm": 30.0, "unbalance_g_mm": 50.0}}
+    assembly = assembled(Gearbox.from_dict(case), Choice("flexible"), {"spur": 3e8})
+    q, v = np.zeros((2, assembly.size))
+    v[assembly.spin["shaft_1"]] = 200.0
+    found = LoadTable(varying=assembly.varying_loads).generalized(assembly, 0.0, q, v)
+    expected = np.zeros(assembly.size)
+    expected[assembly.coordinates["shaft_1.balance"][0]] = 50e-6 * 200.0**2
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-15)
