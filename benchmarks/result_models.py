@@ -156,6 +156,14 @@ def steady_section(part: Results) -> str:
         [row["what"], *(f"{row[key] / first[key]:.2f}" for key in ("processor_s", "run_up_s"))]
         for row in part["dissipation"]
     ]
+    excitations = [
+        [str(row["excitations"]), row["method"], str(row["lines"]), duration(row["processor_s"] / row["speeds"])]
+        for row in part.get("excitations", ())
+    ]
+    by_excitations = [
+        "Stated excitations of one order each, on four bodies, variant bushing, no speeds added:\n",
+        table(["excitations", "method", "lines", "a speed"], excitations),
+    ]
     return "\n".join(
         [
             "## Steady-state response\n",
@@ -170,6 +178,7 @@ def steady_section(part: Results) -> str:
             table(["harmonics", "sum of multiples of combinations", "lines", "all"], growth),
             "Damping and friction over damping times alone, variant bushing:\n",
             table(["dissipation", "response, parametric", "run-up"], dissipation),
+            *(by_excitations if excitations else ()),
             items(
                 [
                     "Limited by: half of a speed is the compliance of each line, a dense solution of the mean "

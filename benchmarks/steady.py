@@ -32,6 +32,8 @@ DISSIPATION = {
     "modal damping, friction of teeth": {"modal_percent": 2.0, "tooth_friction": 0.05},
 }
 """Keys of the section on damping by what they add."""
+EXCITATIONS = (0, 1, 3, 10)
+"""Numbers of stated excitations."""
 LINES = ((10, 3), (10, 5), (16, 4), (20, 3))
 """Harmonics, and largest sum of multiples of combinations."""
 
@@ -64,6 +66,22 @@ def dissipation_of(gearbox: Gearbox, speeds: SpeedRange, duration: float) -> dic
     curves = curves_of(gearbox)
     response = cost_of(assemble(gearbox, choice, curves), SteadySettings(speeds, at_resonances=False))
     return {**response, "run_up_s": run_up_of(gearbox, choice, curves, {}, duration)}
+
+
+def excitations_of(gearbox: Gearbox, speeds: SpeedRange) -> list[dict[str, Any]]:
+    """Processor time of responses with torques on shafts and carrier, each of one order, variant bushing."""
+    bodies = ("hss", "lss", "carrier", "ims")
+    rows = []
+    for count in EXCITATIONS:
+        torques = {
+            f"torque_{n}": {"body": bodies[n % len(bodies)], "orders": [7 + 3 * n], "torque_N_m": [20.0]}
+            for n in range(count)
+        }
+        assembly = assemble(gearbox.varied({"excitations": torques}), Choice("bushing"), stiffness_of(gearbox))
+        for method in ("linear", "parametric"):
+            settings = SteadySettings(speeds, method, at_resonances=False)
+            rows.append({"excitations": count, **cost_of(assembly, settings)})
+    return rows
 
 
 def run_up_of(
@@ -111,6 +129,11 @@ def measure(quick: bool) -> dict[str, Any]:
         for what, keys in DISSIPATION.items()
     ]
     coordinates = {variant: assembly.size for variant, assembly in assemblies.items()}
-    return {"responses": rows, "growth": growth, "run_ups": run_ups, "dissipation": dissipation} | {
-        "coordinates": coordinates
+    return {
+        "responses": rows,
+        "growth": growth,
+        "run_ups": run_ups,
+        "dissipation": dissipation,
+        "excitations": excitations_of(gearbox, speeds),
+        "coordinates": coordinates,
     }

@@ -34,6 +34,7 @@ LONG = (
     "flanks_and_deviations",
     "flexible_bodies",
     "lubricant",
+    "machine_ripple",
     "measured_run_up",
     "operating_range",
     "reference_analysis",
@@ -42,6 +43,7 @@ LONG = (
     "studies",
     "te_tables_over_load",
     "torque_series",
+    "unbalance",
 )
 NEEDS_GMSH = ("flexible_bodies", "solids_in_python")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from exugear.cli.console import BadInputError, check_results_folder, counted, model_errors, note
@@ -59,17 +60,30 @@ def open_project(
     mesh_model: str = "line_of_action",
     inertias: str | None = None,
     load_case: str | None = None,
+    without: Sequence[str] = (),
 ) -> WatchedProject:
     """Read a gearbox file and raise an error for invalid or unavailable model settings; write no files.
 
-    Without a variant, the usual one of the gearbox is chosen.
+    Parameters
+    ----------
+    variant : by default the usual one of the gearbox
+    without : names of excitations that are left out
     """
-    gearbox = read_gearbox(case, allow_dir, scripts)
+    gearbox = _without(read_gearbox(case, allow_dir, scripts), without)
     choice = Choice(variant or _chosen_variant(gearbox), str(mesh_model), inertias, load_case)
     folder = out or default_folder(case)
     check_choice(gearbox, choice, folder)
     check_results_folder(folder)
     return WatchedProject(gearbox, folder, choice)
+
+
+def _without(gearbox: Gearbox, names: Sequence[str]) -> Gearbox:
+    """Leave out excitations by their names."""
+    for name in names:
+        if name not in gearbox.case.excitations:
+            known = ", ".join(gearbox.case.excitations) or "none in the file"
+            raise BadInputError(f"--without {name}: no such excitation; choose one of: {known}")
+    return gearbox.varied({f"excitations.{name}.enabled": False for name in names}) if names else gearbox
 
 
 def _chosen_variant(gearbox: Gearbox) -> Variant:

@@ -82,10 +82,14 @@ FilesBelowOption = Annotated[
         "--allow-dir",
         metavar="DIR",
         envvar="EXUGEAR_ALLOW_DIR",
-        help="Further folder from which the gearbox file may read files.",
+        help="Further folder of files for the gearbox file.",
         show_default=False,
         show_envvar=False,
     ),
+]
+WithoutOption = Annotated[
+    list[str] | None,
+    typer.Option("--without", metavar="NAME", help="Leave out an excitation; repeatable.", show_default=False),
 ]
 ScriptsOption = Annotated[
     bool,

@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from exugear.cli.tables import HARD_SPACE, Column, Table, detail, significant
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import static_load_in_words
 from exugear.gearbox.units import RPM
 from exugear.report.findings.ranking import UNIT_KEYS, Ranking
-from exugear.report.findings.words import QUANTITIES
+from exugear.report.findings.words import QUANTITIES, Labels
+from exugear.steady.peaks import line_name
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 ORDER = Column("order", "line", lambda line: line.replace(" x ", " × "))
+LEAST_SOURCE = 0.01
+"""Least share of the amplitude of an order with which a source is listed."""
 SPEED = Column("speed\nrpm", lambda own: abs(own["speed_rpm"]), partial(significant, digits=3))
 FREQUENCY = Column("freq.\nHz", "frequency_Hz", partial(significant, digits=3))
 
 
-def highest_resonance(ranking: Ranking) -> str:
+def highest_resonance(gearbox: Gearbox, ranking: Ranking) -> str:
     """Return the first resonance of a ranking in one line."""
     if not ranking.resonances:
         return f"No resonance, {_speeds(ranking)}"
@@ -28,8 +35,30 @@ def highest_resonance(ranking: Ranking) -> str:
     at = f"{first[f'{quantity}_at']}, " if f"{quantity}_at" in first else ""
     return (
         f"Highest {label.column} ±{_amplitude(quantity, first)} {label.unit}: {at}{SPEED.cell(first)} rpm, "
-        f"{FREQUENCY.cell(first)} Hz, {ORDER.cell(first)}"
+        f"{FREQUENCY.cell(first)} Hz, {_order(gearbox).cell(first)}"
     )
+
+
+def _order(gearbox: Gearbox) -> Column:
+    """Column of orders with the excitations of the file that have them."""
+    words = Labels(gearbox)
+    return Column("order", lambda own: ORDER.cell(own) + words.causes(own["order"]))
+
+
+def source_table(gearbox: Gearbox, data: xr.Dataset) -> Table | None:
+    """Return the shares of meshes and excitations in the orders at resonances; None for a file without excitations."""
+    if not gearbox.varying_loads:
+        return None
+    bases = tuple(str(name) for name in data["base"].to_numpy())
+    rows = []
+    for peak in json.loads(data.attrs["contributions"]):
+        name = line_name(tuple(data["index"].to_numpy()[peak["line"]].tolist()), bases)
+        shares = sorted(peak["meshes"].items(), key=lambda own: -abs(own[1]))
+        listed = [f"{source} {100.0 * share:.0f} %" for source, share in shares if abs(share) >= LEAST_SOURCE]
+        rows.append({"line": name, "speed_rpm": peak["speed"] / RPM, "from": ", ".join(listed) or "-"})
+    legend = "Shares along the sum, opposed ones negative; method linear."
+    columns = [ORDER, SPEED, Column("from", "from", is_text=True)]
+    return Table("Sources of the transmission error at resonances", rows, columns, legend, noun="resonances")
 
 
 def _speeds(ranking: Ranking) -> str:
@@ -61,7 +90,7 @@ def resonance_table(gearbox: Gearbox, ranking: Ranking, model: str) -> Table:
         legend += f"; force: dynamic bearing force; accel.: {owner} at the bearing"
     if "surface_velocity" in names[:3]:
         legend += "; surface: normal velocity of the housing, rms over its outer surface"
-    columns = [ORDER, SPEED, FREQUENCY, Column(_heading(first), partial(_amplitude_and_range, first))]
+    columns = [_order(gearbox), SPEED, FREQUENCY, Column(_heading(first), partial(_amplitude_and_range, first))]
     if first not in ("error", "surface_velocity"):
         columns.append(Column("at", f"{first}_at", is_text=True))
     columns += [Column(_heading(name), partial(_amplitude, name)) for name in names[1:3]]

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import cmath
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 from exugear.gearbox.named_files import LARGEST_TABLE
-from exugear.gearbox.parts import Bearing, Body, Coupling, DampingTimes, Joint, LoadCase, PointForce, TorqueOrder
+from exugear.gearbox.parts import Bearing, Body, Coupling, DampingTimes, Joint, LoadCase, PointForce, VaryingLoad
 from exugear.gearbox.reading import Origin, part_of_each, parts_of_each
 from exugear.gearbox.sections.bodies import BodySection, InertiaSection
-from exugear.gearbox.sections.case import DampingSection, ExcitationSection, ForceSection, GearboxFile, LoadCaseSection
+from exugear.gearbox.sections.case import DampingSection, ForceSection, GearboxFile, LoadCaseSection
 from exugear.gearbox.sections.connections import (
     BearingSection,
     ConnectorDampingSection,
@@ -19,8 +21,10 @@ from exugear.gearbox.sections.connections import (
     StiffnessSection,
 )
 from exugear.gearbox.sections.entries import GROUND
+from exugear.gearbox.sections.excitation_tables import TableError, read_ripple_table
+from exugear.gearbox.sections.excitations import ExcitationSection
 from exugear.gearbox.sections.gears import GearSection, PinSection
-from exugear.gearbox.units import MM, RPM, UM, optional_si, si
+from exugear.gearbox.units import DEG, MM, RPM, UM, optional_si, si
 from fe_ste.geometry.cylinders import MassProperties, Tube, mass_properties, together
 
 
@@ -451,33 +455,130 @@ def point_forces(origin: Origin, bodies: Mapping[str, Body]) -> tuple[PointForce
     return parts_of_each(convert_section, origin.case.forces)
 
 
-def torque_orders(origin: Origin, bodies: Mapping[str, Body]) -> tuple[TorqueOrder, ...]:
-    """Torques on enabled bodies that vary with their angle, order by order.
+def varying_loads(
+    origin: Origin, bodies: Mapping[str, Body], static_torque: Callable[[str], float]
+) -> tuple[VaryingLoad, ...]:
+    """Convert forces and moments on enabled bodies that vary with their angle, order by order.
+
+    Parameters
+    ----------
+    static_torque : torque on a body in the static load, N m; asked for where an amplitude depends on it
 
     Raises
     ------
     GearboxFileError
-        A torque acts on the ground, on a body that does not rotate, on a planet, or on an unknown body.
+        A load acts on the ground, on a body that does not rotate or is unknown, or a force or an unbalance on a body
+        without a position; or a table cannot be used.
     """
 
-    def convert_section(name: str, section: ExcitationSection) -> tuple[TorqueOrder, ...]:
+    def convert_section(name: str, section: ExcitationSection) -> tuple[VaryingLoad, ...]:
         key = f"excitations.{name}"
-        if section.body == GROUND or not origin.are_enabled(key, section.body) or not section.enabled:
-            if section.body == GROUND:
-                raise origin.error(f"{key}.body = {GROUND!r}: a torque on the ground has no effect; set a moving body")
+        if section.body == GROUND:
+            raise origin.error(f"{key}.body = {GROUND!r}: a load on the ground has no effect; set a moving body")
+        loaded = [bodies[section.body]] if section.body in bodies else []
+        if not loaded and origin.are_enabled(key, section.body):
+            loaded = [body for body in bodies.values() if body.family == section.body]  # a set of planets
+        reaction_on = _reaction_of(origin, key, section, bodies)
+        if not section.enabled:
             return ()
-        if origin.case.bodies[section.body].carrier is not None or bodies[section.body].fixed:
-            raise origin.error(
-                f"{key}.body = {section.body!r}: a planet or a fixed body cannot have a varying torque; set a rotating "
-                "body on a fixed axis"
-            )
-        phases = section.phase_deg or (0.0,) * len(section.orders)
-        return tuple(
-            TorqueOrder(name, section.body, order * section.pole_pairs, amplitude, math.radians(phase))
-            for order, amplitude, phase in zip(section.orders, section.torque_N_m, phases, strict=True)
-        )
+        loads: list[VaryingLoad] = []
+        for body in loaded:
+            _check_load_on(origin, key, section, body)
+            loads += _loads_on(origin, name, section, body, static_torque)
+        return tuple(replace(load, reaction_on=reaction_on) for load in loads)
 
     return parts_of_each(convert_section, origin.case.excitations)
+
+
+def _reaction_of(origin: Origin, key: str, section: ExcitationSection, bodies: Mapping[str, Body]) -> str | None:
+    """Body on which the reaction of an excitation acts; None for the ground."""
+    name = section.reaction_on
+    if name is None or name == GROUND:
+        return None
+    if name not in bodies and not origin.are_enabled(f"{key}.reaction_on", name):
+        return None
+    where = f"{key}.reaction_on = {name!r}"
+    if name == section.body:
+        raise origin.error(f"{where}: the load acts on this body itself; set the body that reacts it")
+    if name not in bodies or bodies[name].carrier is not None:
+        raise origin.error(f"{where}: a planet cannot take a reaction; set another body")
+    if bodies[name].spin_only and (section.force_N or section.moment_N_m):
+        raise origin.error(f"{where}: a spin-only body takes torques only; set a body with a position")
+    return name
+
+
+def _check_load_on(origin: Origin, key: str, section: ExcitationSection, body: Body) -> None:
+    """Raise an error for a body that cannot have the load of an excitation."""
+    if body.fixed:
+        raise origin.error(f"{key}.body = {section.body!r}: a fixed body has no angle; set a rotating body")
+    if section.z_mm is not None and body.spin_only:
+        raise origin.error(
+            f"{key}.z_mm: {section.body!r} is a spin-only body, which takes torques only; remove z_mm, forces, moments "
+            "and unbalance, or give the body a position"
+        )
+    halves = [order for order in section.orders if order * section.pole_pairs % 1.0]
+    if halves and body.carrier is not None:
+        raise origin.error(f"{key}.orders: {halves[0]:g}: half orders of planets are not supported; set whole numbers")
+
+
+def _loads_on(
+    origin: Origin, name: str, section: ExcitationSection, body: Body, static_torque: Callable[[str], float]
+) -> Iterator[VaryingLoad]:
+    """Yield the loads of an excitation on one body, order by order, without its reaction."""
+    position = None if section.z_mm is None else _position(body, section.z_mm)
+    if section.unbalance_g_mm is not None:
+        unbalance = si(section, "unbalance_g_mm") * _phasor(section, 0)
+        yield VaryingLoad(name, body.name, 1.0, position, (unbalance, -1j * unbalance, 0j, 0j, 0j, 0j), 2.0)
+        return
+    if section.table is not None:
+        key = f"excitations.{name}.table"
+        path = origin.file(key, section.table, LARGEST_TABLE)
+        try:
+            table = read_ripple_table(path)
+            curves = table.curves(static_torque(body.name) if table.has_torques else 0.0)
+        except TableError as error:
+            raise origin.error(f"{key} = {section.table!r}: {error}") from None
+        for order, rows in curves.items():
+            curve = tuple((RPM * speed, amplitude, DEG * phase) for speed, amplitude, phase in rows)
+            unit = (0j, 0j, 0j, 0j, 0j, 1.0 + 0j)
+            yield VaryingLoad(name, body.name, order * section.pole_pairs, position, unit, curve=curve)
+        return
+    share = 0.0
+    if section.torque_percent:
+        share = 0.01 * abs(static_torque(body.name))
+        if share == 0.0:
+            raise origin.error(
+                f"excitations.{name}.torque_percent: {body.name!r} has no torque in the static load, neither applied "
+                "nor by being locked; set torque_N_m"
+            )
+    growth = 1.0
+    if section.reference_speed_rpm is not None:
+        growth = si(section, "reference_speed_rpm") ** -section.speed_exponent
+    for n, order in enumerate(section.orders):
+        wrench = tuple(growth * value for value in _wrench(section, n, share))
+        yield VaryingLoad(name, body.name, order * section.pole_pairs, position, wrench, section.speed_exponent)
+
+
+def _phasor(section: ExcitationSection, n: int) -> complex:
+    """Factor exp(i phi) of the n-th order of an excitation."""
+    return cmath.rect(1.0, math.radians(section.phase_deg[n]) if section.phase_deg else 0.0)
+
+
+def _wrench(section: ExcitationSection, n: int, share: float) -> tuple[complex, ...]:
+    """Complex force (N) and moment (N m) of the n-th order of an excitation; `share` N m are a percent of torque."""
+    phasor = _phasor(section, n)
+    sense = {"fixed": 0, "rotating": 1, "counter_rotating": -1}[section.direction]
+
+    def turned(x: float, y: float) -> tuple[complex, complex]:
+        # (x, y) turned by an angle a is (x cos a - y sin a, x sin a + y cos a).
+        return (x + sense * 1j * y) * phasor, (y - sense * 1j * x) * phasor
+
+    x, y, z = section.force_N[n] if section.force_N else (0.0, 0.0, 0.0)
+    moment = section.moment_N_m[n] if section.moment_N_m else (0.0, 0.0)
+    torque = section.torque_N_m[n] if section.torque_N_m else 0.0
+    if section.torque_percent:
+        torque = share * section.torque_percent[n]
+    return (*turned(x, y), z * phasor, *turned(*moment), torque * phasor)
 
 
 def couplings(origin: Origin, spinning: Sequence[str], bearing_names: Sequence[str]) -> tuple[Coupling, ...]:

@@ -14,7 +14,17 @@ from typing import NamedTuple
 import numpy as np
 
 from exugear.gearbox.body_parts import blank_places
-from exugear.gearbox.parts import Bearing, Body, Coupling, Joint, LoadCase, Mesh, PointForce, connector_matrix
+from exugear.gearbox.parts import (
+    Bearing,
+    Body,
+    Coupling,
+    Joint,
+    LoadCase,
+    Mesh,
+    PointForce,
+    VaryingLoad,
+    connector_matrix,
+)
 from exugear.gearbox.reading import GearboxFileError, known_names, shortened
 from exugear.gearbox.sections.case import GearboxFile
 from exugear.gearbox.sections.connections import BearingSection, ConnectorDampingSection, StiffnessSection
@@ -431,6 +441,18 @@ def errors_of_names(elements: Mapping[str, Sequence[Element]]) -> Iterator[str]:
             tables[part.name] = table
 
 
+def errors_of_excitations(
+    varying_loads: Iterable[VaryingLoad], elements: Mapping[str, Sequence[Element]]
+) -> Iterator[str]:
+    """Yield an error for an excitation with the name of a mesh, support, coupling or force; results list them alike."""
+    excitations = {load.excitation for load in varying_loads}
+    for table, members in elements.items():
+        for part in members:
+            for name in sorted(excitations & {part.name, part.family if isinstance(part, Mesh) else part.name}):
+                yield f"excitations.{name}: also a name in [{table}]; rename one"
+                return
+
+
 def errors_of_joints(joints: Iterable[Joint], named_bodies: Mapping[str, Body]) -> Iterator[str]:
     """Yield an error for the first invalid joint: on a fixed body, a second joint, or a planet off its carrier."""
     joined: dict[str, str] = {}
@@ -498,7 +520,6 @@ CHECKS = (
     Check("joints", None, ("bodies_by_inertias",)),
     Check("mounts", None, ("bodies_by_inertias",)),
     Check("forces", None, ("bodies_by_inertias",)),
-    Check("torque_orders", None, ("bodies_by_inertias",)),
     Check("load_cases", None, ("bodies_by_inertias",)),
     Check("pin_offsets", None, ("bodies_by_inertias",)),
     Check("blanks", errors_of_blanks, ("bearings", "mounts", "forces")),
@@ -517,6 +538,7 @@ CHECKS = (
     Check("repetition", errors_of_repetition, ("deviations", "pin_offsets")),
     Check("output", errors_of_output_gear, ("ends", "gears", "couplings")),
     Check("train", errors_of_train, ("connection", "size", "load_cases")),
+    Check("varying_loads", errors_of_excitations, ("train", "names")),
 )
 """Checks in the order in which they are run."""
 ALONE = ("names of bodies", "masses", "gears", "file_stiffness", "supports", "modifications", "gear_pairs")

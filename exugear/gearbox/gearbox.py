@@ -29,7 +29,7 @@ from exugear.gearbox.parts import (
     Mesh,
     PairSpec,
     PointForce,
-    TorqueOrder,
+    VaryingLoad,
     WheelDeviation,
     connector_matrix,
 )
@@ -335,9 +335,9 @@ class Gearbox(ReprMixin):
         return body_parts.point_forces(self._origin, self.named_bodies)
 
     @cached_property
-    def torque_orders(self) -> tuple[TorqueOrder, ...]:
-        """Torques on bodies that vary with their angle, order by order."""
-        return body_parts.torque_orders(self._origin, self.named_bodies)
+    def varying_loads(self) -> tuple[VaryingLoad, ...]:
+        """Forces and moments on bodies that vary with their angle, order by order."""
+        return body_parts.varying_loads(self._origin, self.named_bodies, lambda body: self.train.static_torques[body])
 
     @cached_property
     def couplings(self) -> tuple[Coupling, ...]:

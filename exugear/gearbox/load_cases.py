@@ -88,6 +88,8 @@ BAND_STEP = 100.0
 """Step to which a proposed band is rounded up, Hz."""
 SHOWN_MESHES = 3
 """Maximum number of meshes above the band that a message lists."""
+COVERED = 1e-6
+"""Relative excess of speeds over those of a table that is put down to round-off."""
 INSTANTS = 2001
 """Number of evaluated instants for a torque that changes with time, in addition to those of its own rows."""
 
@@ -357,6 +359,14 @@ def band_warning(loads: LoadSummary, band: float) -> str:
     )
 
 
+def table_speed_warning(gearbox: Gearbox, loads: LoadSummary) -> str:
+    """Return a text on an excitation whose table does not cover the speeds of a load case; empty if all do."""
+    passed = (loads.start_speed, loads.end_speed)
+    slowest = min(map(abs, passed)) if passed[0] * passed[1] > 0.0 else 0.0
+    beyond = speeds_beyond_tables(gearbox, slowest, loads.fastest_speed)
+    return f"load_cases.{loads.name}: {beyond}" if beyond else ""
+
+
 def load_case_warnings(
     gearbox: Gearbox,
     case: LoadCase,
@@ -389,6 +399,7 @@ def load_case_warnings(
         other_load_warning(gearbox, loads, uses_single_load),
         band_warning(loads, band),
         friction_warning(gearbox, loads),
+        table_speed_warning(gearbox, loads),
     )
     return tuple(filter(None, found))
 
@@ -558,6 +569,27 @@ def _shares(gearbox: Gearbox, forces: Floats, extreme: Callable[..., float]) -> 
             share = extreme((forces[:, m] / static[mesh.name]).tolist())
             shares[mesh.family] = extreme(share, shares.get(mesh.family, share))
     return shares
+
+
+def speeds_beyond_tables(gearbox: Gearbox, lowest: float, highest: float) -> str:
+    """Return an error text for speeds that the table of an excitation does not cover; empty if all are covered.
+
+    Parameters
+    ----------
+    lowest, highest : speeds of the overall input without sign, rad/s
+    """
+    speeds = gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
+    for load in gearbox.varying_loads:
+        if not load.curve or load.body not in speeds or speeds[load.body] == 0.0:
+            continue
+        wanted = [abs(speeds[load.body]) * speed / RPM for speed in (lowest, highest)]
+        covered = [load.curve[0][0] / RPM, load.curve[-1][0] / RPM]
+        if wanted[0] < covered[0] * (1.0 - COVERED) or wanted[1] > covered[1] * (1.0 + COVERED):
+            return (
+                f"excitations.{load.excitation}.table: covers {covered[0]:.6g} to {covered[1]:.6g} rpm of {load.body}, "
+                f"which turns at {wanted[0]:.6g} to {wanted[1]:.6g} rpm; add rows, or limit the speeds"
+            )
+    return ""
 
 
 # Operating speed range, which decides which resonances count

@@ -152,18 +152,28 @@ class PointForce:
 
 
 @dataclass(frozen=True)
-class TorqueOrder:
-    """Torque A cos(n theta + phi) on a body at the angle theta."""
+class VaryingLoad:
+    """Force and moment Re(w exp(i n theta)) |Omega|^p on a body at its angle theta and speed Omega.
+
+    A component A cos(n theta + phi) has w = A exp(i phi). A force of fixed size F that turns with the angle
+    n theta + phi has w = F exp(i phi) along x and -i F exp(i phi) along y.
+    """
 
     excitation: str
     """Name of its section."""
     body: str
-    order: int
+    order: float
     """Periods n per revolution of the body."""
-    amplitude: float
-    """A, N m."""
-    phase: float
-    """phi, rad."""
+    position: tuple[float, float, float] | None
+    """(3,) place at zero angles, m; None for a torque, which acts where constant torques do."""
+    wrench: tuple[complex, ...]
+    """(6,) w: force along x, y, z (N s^p), moment about x, y, z (N m s^p), zero to peak."""
+    exponent: float = 0.0
+    """p, of the speed in rad/s."""
+    reaction_on: str | None = None
+    """Body on which the opposite load acts at the same place."""
+    curve: tuple[tuple[float, float, float], ...] = ()
+    """Instead of the power: rows of speed (rad/s), ascending, with factor on w and phase (rad), linear in between."""
 
 
 @dataclass(frozen=True)

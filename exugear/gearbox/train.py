@@ -354,6 +354,27 @@ class Train(
             Made by `error`: a body cannot rotate, too many bodies are locked, or they do not balance the torques.
         """
         torques = self.torques if torques is None else torques
+        forces = self._holding(torques)
+        applied = list(torques.values())
+        smallest_radius = min((mesh.pair.pinion.base_radius for mesh in self.meshes), default=1.0)
+        loaded = without_round_off(forces[: len(self.meshes)], np.abs(applied).max(initial=0.0), smallest_radius)
+        return {mesh.name: float(force) for mesh, force in zip(self.meshes, loaded, strict=True)}
+
+    @cached_property
+    def static_torques(self) -> dict[str, float]:
+        """Torque on each body in the static load by name, applied or by being locked, N m; without its sign if locked.
+
+        Raises
+        ------
+        Exception
+            As `static_mesh_forces`.
+        """
+        found = {name: self.torques.get(name, 0.0) for name in self.spins}
+        reactions = self._holding(self.torques)[len(self.spin_rows) :]
+        return found | {name: abs(float(force)) for name, force in zip(self.locked, reactions, strict=True)}
+
+    def _holding(self, torques: Mapping[str, float]) -> Floats:
+        """Find forces of constraints and torques of locks in equilibrium with torques, (spin rows + locks,)."""
         self._check_load(torques)
         applied = np.array([torques.get(name, 0.0) for name in self.spins])
         locks = np.array([[float(name == lock) for name in self.spins] for lock in self.locked])
@@ -363,9 +384,7 @@ class Train(
                 f"static_load: locking {', '.join(self.locked) or 'nothing'} does not balance the torques "
                 f"{dict(torques)}; check static_load.locked"
             )
-        smallest_radius = min((mesh.pair.pinion.base_radius for mesh in self.meshes), default=1.0)
-        loaded = without_round_off(forces[: len(self.meshes)], np.abs(applied).max(), smallest_radius)
-        return {mesh.name: float(force) for mesh, force in zip(self.meshes, loaded, strict=True)}
+        return forces
 
     def dragging_forces(self) -> dict[str, float]:
         """Line-of-action force of each mesh (N) for a drag torque of 1 N m on each body, at the static locks.

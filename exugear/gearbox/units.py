@@ -66,6 +66,7 @@ _BY_QUANTITY: Final[dict[str, dict[str, float]]] = {
     "mass per width": {"kg/mm": 1e3},
     "density": {"kg/m3": 1.0, "kg/dm3": 1e3},
     "inertia": {"kgm2": 1.0},
+    "unbalance": {"gmm": 1e-6},
     "viscosity": {"mm2/s": 1e-6},
     "temperature": {"C": 1.0},
 }

@@ -49,7 +49,7 @@ from exugear.steady.mean_system.mesh_places import (
     mesh_ports,
 )
 from exugear.steady.mean_system.mesh_waves import MeshWaves, mesh_waves
-from exugear.steady.mean_system.shaft_orders import ShaftOrders
+from exugear.steady.mean_system.shaft_orders import Places, ShaftOrders, at_lines
 from exugear.steady.mean_system.signals import (
     AXES,
     SURFACE_VELOCITY,
@@ -76,7 +76,7 @@ MOST_LINES = 500
 class LoadResponse:
     """Response to loads on the bodies beside the forces along the meshes' rows at one speed; n orders.
 
-    These are the friction of the teeth, stated torques, and those by which mesh forces act on gears with deviations.
+    These are the friction of the teeth, stated loads, and those by which mesh forces act on gears with deviations.
     """
 
     loads: Complexes
@@ -125,10 +125,7 @@ class Interface:
     @cached_property
     def deflection(self) -> Complexes:
         """Deflections (n, m, m, f) under a unit of each force."""
-        rows, (lines, size, *loads) = self.ports.readings[:, DEFLECTION], self.motion.shape
-        # A row's numbers are real: so are the products with both parts of the motion.
-        found = rows @ self.motion.view(np.float64).reshape(lines, size, -1)
-        return np.asarray(found.view(np.complex128).reshape(lines, len(rows), *loads))
+        return _taken(self.ports.readings[:, DEFLECTION], self.motion)
 
     @cached_property
     def deflection_per_force(self) -> Complexes:
@@ -144,11 +141,20 @@ class Interface:
 
     def read(self, motion: Complexes) -> Complexes:
         """Find what the laws read (n, m, r, ...) of a motion (n, size, ...)."""
-        found = np.moveaxis(np.tensordot(self.ports.readings, motion, axes=(2, 1)), 2, 0)
+        found = _taken(self.ports.readings, motion)
         if self.ports.rates is not None:
             moving = 1j * self.frequencies.reshape(-1, *(1,) * (motion.ndim - 1)) * motion
-            found = found + np.moveaxis(np.tensordot(self.ports.rates, moving, axes=(2, 1)), 2, 0)
-        return np.ascontiguousarray(found)
+            found += _taken(self.ports.rates, moving)
+        return found
+
+
+def _taken(rows: Floats, motion: Complexes) -> Complexes:
+    """Products (n, ..., ...) of rows (..., size) with a motion (n, size, ...)."""
+    lines, size, *loads = motion.shape
+    # A row's numbers are real: so are the products with both parts of the motion.
+    parts = np.ascontiguousarray(motion).view(np.float64).reshape(lines, size, -1)
+    found = np.ascontiguousarray(rows).reshape(-1, size) @ parts
+    return np.asarray(found.view(np.complex128).reshape(lines, *rows.shape[:-1], *loads))
 
 
 @dataclass(frozen=True)
@@ -186,7 +192,7 @@ class HarmonicBalanceModel:
     ----------
     harmonics : of each mesh frequency. The mesh stiffness has twice as many.
     combinations : largest sum of multiples of several mesh frequencies
-    orders : orders of shafts, by deviations of gears and stated torques
+    orders : orders of shafts, by deviations of gears and stated loads
 
     Notes
     -----
@@ -634,34 +640,34 @@ class HarmonicBalanceModel:
         )
 
     @cached_property
-    def _loads_beside(self) -> Complexes:
-        """Generalized forces (3, n, size) at the three speeds of friction and of deviations; empty without either."""
-        has_friction = self.waves.assembly.gearbox.case.damping.tooth_friction != 0.0
-        if not (has_friction or self.shaft_orders.sidebands):
+    def _friction(self) -> Complexes:
+        """Generalized forces (3, n, size) of the friction of teeth at the three speeds; empty without it."""
+        if self.waves.assembly.gearbox.case.damping.tooth_friction == 0.0:
             return np.zeros((0, 0, 0), dtype=complex)
-        found = []
-        for speed in map(float, self.system.speeds):
-            loads = self.shaft_loads(speed)
-            if has_friction:
-                loads = loads + tooth_friction(self.waves, self.lines, self.ports_at(speed), speed, self.harmonics)
-            found.append(loads)
-        return np.array(found)
+        speeds = map(float, self.system.speeds)
+        return np.array([tooth_friction(self.waves, self.lines, self.ports_at(s), s, self.harmonics) for s in speeds])
+
+    @cached_property
+    def _shaft_places(self) -> Places:
+        """Places of the terms of the orders of shafts among the lines."""
+        return self.shaft_orders.places(self.lines, len(self.waves.base_orders))
 
     def shaft_loads(self, speed: float, source: str | None = None) -> Complexes:
-        """Generalized forces (n, size) of deviations and stated torques at the lines, or those of one stated torque."""
+        """Generalized forces (n, size) of deviations and stated loads at the lines, or those of one excitation."""
         orders = self.shaft_orders
         if not orders.sidebands:
             return np.zeros((len(self.lines.index), self.system.size), dtype=complex)
         counted = np.array([source in (None, name) for name in orders.source])
-        return orders.at_lines(orders.reaction * counted[:, None], self.lines, len(self.waves.base_orders), speed)
+        reaction = orders.reaction_at(speed, self.system.static_at(speed)) * counted[:, None]
+        return at_lines(reaction, self._shaft_places, len(self.lines.index), speed)
 
     @cached_property
     def _displacements(self) -> Complexes:
         """Deviations (n, m) of gears at the lines where the input turns about +z, m."""
-        waves = self.waves
+        lines = len(self.lines.index)
         if not self.shaft_orders.sidebands:
-            return np.zeros((len(self.lines.index), len(waves.waves)), dtype=complex)
-        return self.shaft_orders.at_lines(self.shaft_orders.displacement, self.lines, len(waves.base_orders), 1.0)
+            return np.zeros((lines, len(self.waves.waves)), dtype=complex)
+        return at_lines(self.shaft_orders.displacement, self._shaft_places, lines, 1.0)
 
     def deviations(self, speed: float) -> Complexes:
         """Deviations (n, m) of gears in the meshes at the lines, at a speed of the input (rad/s), m."""
@@ -672,9 +678,11 @@ class HarmonicBalanceModel:
     ) -> LoadResponse | None:
         """Solve for the response to these loads at a speed of the input, rad/s; None without any."""
         system = self.system
-        if not self._loads_beside.size:
+        if not (self._friction.size or self.shaft_orders.sidebands):
             return None
-        loads = system.at(self._loads_beside, speed)
+        loads = self.shaft_loads(speed)
+        if self._friction.size:
+            loads += system.at(self._friction, speed)
         motion = np.zeros(loads.shape, dtype=complex)
         still = system.still(pencil[0], loads[0].real[:, None])[:, 0]
         motion[0] = still[:-1]

@@ -122,7 +122,7 @@ def deviation_forces(model: HarmonicBalanceModel, interface: Interface) -> Compl
     """Find the forces (n, m, f) of the deviations of gears, -k e - c e' with k over the mesh cycle, N and N m."""
     ports = interface.ports
     forces = np.zeros((len(model.lines.index), *ports.forces.shape[:2]), dtype=complex)
-    if not model.shaft_orders.sidebands:
+    if not model.deviations(interface.speed).any():
         return forces
     errors = forces.copy()
     errors[..., DEFLECTION] = model.deviations(interface.speed)
@@ -149,11 +149,11 @@ def forces_of_positions(model: HarmonicBalanceModel, response: Response) -> Comp
     if waves.loads.any():
         pulls = {(DEFLECTION, DEFLECTION): -derivative * model.cycle_pulls}
         changes += _products(model, pulls, ports, speed, _everywhere(model, shape))
-    positions = response.motion @ ports.readings[: shape[1], POSITION].T
     lines, coupling = model.slow_shifts
-    if (2.0 * np.abs(positions[lines])).sum(axis=0).max(initial=0.0) > LARGEST_SHIFT:
+    positions = response.motion[lines] @ np.ascontiguousarray(ports.readings[: shape[1], POSITION].T)
+    if (2.0 * np.abs(positions)).sum(axis=0).max(initial=0.0) > LARGEST_SHIFT:
         return np.zeros(shape, dtype=complex)
-    shifts = np.concatenate([positions[lines], positions[lines].conj()])
+    shifts = np.concatenate([positions, positions.conj()])
     # What two signals of a family of planets multiply to: each wave by the mean of the other.
     mean = [next(n for n, own in enumerate(waves.waves) if own.first == wave.first) for wave in waves.waves]
     products = np.zeros((len(shifts), shape[1], shape[1]), dtype=complex)
@@ -204,16 +204,16 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
     moved = np.zeros_like(given)
     found = None
     products = 0
-    for _ in range(1 + (POSITIONS_REPEATED if repeated else 0)):
+    for again in reversed(range(1 + (POSITIONS_REPEATED if repeated else 0))):
         whole = (given + moved).reshape(shape[0], -1)
         start = still - (answers @ whole[..., None])[..., 0]
         found, more = balance.solve(start, found)
         products += more
         excess = (whole + balance.forces(found)).reshape(shape)
         response = _response(model, interface, (found / lengths).reshape(shape)[..., DEFLECTION], excess, products)
-        if repeated:
+        if again:
             moved = forces_of_positions(model, response)
-        if model.ring is not None:
+        if again and model.ring is not None:
             shifted = at_mean_positions(model, interface, response)
             balance = LineBalance(model, shifted, answers, passing)
             given = given_forces(model, shifted) + deviation_forces(model, shifted)

@@ -11,7 +11,13 @@ from typing import Literal, get_args
 import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.load_cases import BURSTING_RIM_SPEED, operating_range, rim_radii, summarise_loads
+from exugear.gearbox.load_cases import (
+    BURSTING_RIM_SPEED,
+    operating_range,
+    rim_radii,
+    speeds_beyond_tables,
+    summarise_loads,
+)
 from exugear.gearbox.units import RPM
 from exugear.gearbox.versions import STEADY
 from exugear.steady.mean_system.planet_sets import SteadyError
@@ -130,13 +136,16 @@ def operating_speeds(gearbox: Gearbox) -> SpeedRange:
 
 
 def check_speeds(gearbox: Gearbox, speeds: SpeedRange) -> None:
-    """Refuse implausibly high speeds.
+    """Refuse implausibly high speeds, and those beyond the table of an excitation.
 
     Raises
     ------
     SteadyError
-        A tip speed exceeds the limit for steel gears.
+        A tip speed exceeds the limit for steel gears, or a table of torque ripple does not cover the speeds.
     """
+    evaluated = np.abs(speeds.values)
+    if beyond := speeds_beyond_tables(gearbox, float(evaluated.min()), float(evaluated.max())):
+        raise SteadyError(f"speeds {speeds.text}: {beyond}")
     fastest = max(abs(speeds.first), abs(speeds.last))
     turns = gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
     rims = {name: abs(turns[name]) * radius for name, radius in rim_radii(gearbox).items()}
@@ -175,7 +184,7 @@ def check_deviations(gearbox: Gearbox, method: Method) -> None:
     SteadyError
         The gearbox file has deviations or excitations, and the method is ``nonlinear``.
     """
-    if (gearbox.deviations or gearbox.torque_orders) and method == "nonlinear":
+    if (gearbox.deviations or gearbox.varying_loads) and method == "nonlinear":
         raise SteadyError(
             "deviations, excitations: the method nonlinear does not include the orders of the shafts; use --method "
             "parametric with --mesh-model line_of_action, or exugear run"

@@ -1,14 +1,13 @@
-"""External loads on a gearbox, in the form that both solvers take: torques over time and angle, and a drive."""
+"""External loads on a gearbox, in the form that both solvers take: loads over time and angle, and a drive."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from exugear.gearbox.parts import TorqueOrder
+from exugear.system.kernels.varying_loads import VaryingLoadArrays, add_varying_loads
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Floats
 
@@ -41,31 +40,25 @@ class LoadTable:
     series: Mapping[str, tuple[Floats, Floats]] = field(default_factory=dict)
     """Times (s) and torques (N m) by body; before and after them the first and last torque act."""
     drive: Drive | None = None
-    orders: tuple[TorqueOrder, ...] = ()
-    """Torques that vary with the angle of their body."""
+    varying: VaryingLoadArrays | None = None
+    """Loads that vary with the angle of a body, of the same assembly; none by default."""
 
     @property
     def is_constant(self) -> bool:
         """Return whether the generalized forces are constant."""
-        return self.drive is None and not self.series and not self.orders
+        return self.drive is None and not self.series and (self.varying is None or not self.varying.turning.size)
 
     def torque(self, body: str, t: float) -> float:
         """Torque of the time series of a body at a time (s), N m."""
         return float(np.interp(t, *self.series[body]))
-
-    def torque_of_orders(self, body: str, angle: float) -> float:
-        """Torque on a body that varies with its angle (rad), N m."""
-        own = (order for order in self.orders if order.body == body)
-        return sum(order.amplitude * math.cos(order.order * angle + order.phase) for order in own)
 
     def generalized(self, assembly: Assembly, t: float, q: Floats, v: Floats) -> Floats:
         """Generalized forces at a state, shape (size,)."""
         f = assembly.torque_vector(self.constant)
         for name in self.series:
             f[assembly.spin[name]] += self.torque(name, t)
-        for name in {order.body for order in self.orders}:
-            i = assembly.spin[name]
-            f[i] += self.torque_of_orders(name, q[i])
+        if self.varying is not None:
+            add_varying_loads(q, v, self.varying, f)
         if self.drive is not None:
             i = assembly.spin[self.drive.body]
             f[i] += self.drive.torque(t, q[i], v[i])

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.parts import Bearing, Body, PointForce, node_position, seat_key
+from exugear.gearbox.parts import Bearing, Body, node_position, seat_key
 from exugear.gearbox.variant import Variant, VariantError
 from exugear.gearbox.versions import MODES, REDUCTION, RUN
 from exugear.system.bearings.duty import OperatingPoint
@@ -38,7 +38,7 @@ from exugear.system.kernels.connectors import (
     connector_strains,
     loads_at_rest,
 )
-from exugear.system.kernels.coordinates import InertiaArrays, SpringArrays, add_spring_forces
+from exugear.system.kernels.coordinates import BODY_SIZE, InertiaArrays, SpringArrays, add_spring_forces
 from exugear.system.kernels.elastic import ElasticArrays, add_elastic_forces, scratch_for
 from exugear.system.kernels.meshes import STATE_SIZE, MeshArrays, gear_positions
 from exugear.system.kernels.modal_damping import ModalArrays, add_modal_damping, modal_memory
@@ -53,11 +53,12 @@ from exugear.system.kernels.turning import (
     travelling_memory,
     travelling_tangent,
 )
+from exugear.system.kernels.varying_loads import VaryingLoadArrays
 from exugear.system.tooth_mesh.contact_state import StaticContacts
 from exugear.system.tooth_mesh.element import MeshElement
 from exugear.system.tooth_mesh.laws.mesh_forces import add_mesh_forces, add_mesh_jacobian, mesh_state
 from exugear.system.tooth_mesh.laws.stiffness import pack
-from fe_ste.tools.arrays import Floats
+from fe_ste.tools.arrays import Complexes, Floats, Integers
 from fe_ste.tools.display import ReprMixin
 from fe_ste.transmission_error.surface import SteSurface
 
@@ -331,25 +332,59 @@ class Assembly(ReprMixin):
             reduced = self.elastic_bodies[name].reduced
             f[elastic_slice] = reduced.mass @ reduced.rigid_motions(reduced.seats[0].position)[:, :3] @ acceleration
         for force in self.gearbox.forces:
-            first, node = self._node_under(force)
-            if first >= 0:
-                x, y, z = np.subtract(force.position, node)
-                f_x, f_y, f_z, m_x, m_y = force.wrench
-                moments = (m_x + y * f_z - z * f_y, m_y + z * f_x - x * f_z)
-                f[first : first + 5] += (f_x, f_y, f_z, *moments)
+            index, values = self._entries(force.name, force.body, force.position, np.array([*force.wrench, 0j]))
+            f[index] += values.real
         return f
 
-    def _node_under(self, force: PointForce) -> tuple[int, Floats]:
-        """First coordinate and place (m) of what a force acts on: its seat, or the body; -1 for what cannot move."""
-        elastic = self.elastic_bodies.get(force.body)
-        if elastic is None:
-            body = next(body for body in self.gearbox.bodies(self.inertias) if body.name == force.body)
-            return self.coordinates.get(force.body, (-1,))[0], node_position(body)
-        places = {seat.name: np.array(seat.position) for seat in elastic.reduced.seats}
-        seat = elastic.shared_seats.get(force.name, force.name)
-        if seat not in places:
-            seat = elastic.main_seat
-        return self.coordinates[seat_key(force.body, seat)][0], places[seat]
+    @cached_property
+    def varying_loads(self) -> VaryingLoadArrays:
+        """Loads of the gearbox file that vary with the angle of a body."""
+        loads = self.gearbox.varying_loads
+        entries = []
+        for load in loads:
+            index, values = self._entries(load.excitation, load.body, load.position, np.array(load.wrench))
+            if load.reaction_on is not None:
+                other, opposite = self._entries(
+                    load.excitation, load.reaction_on, load.position, -np.array(load.wrench)
+                )
+                index, values = np.append(index, other), np.append(values, opposite)
+            entries.append((index, values))
+        waves = np.concatenate([np.zeros(0, dtype=complex), *(values for _, values in entries)])
+        rows = [row for load in loads for row in load.curve]
+        return VaryingLoadArrays(
+            turning=np.array([self.spin[load.body] for load in loads], dtype=np.int64),
+            order=np.array([load.order for load in loads], dtype=np.float64),
+            exponent=np.array([load.exponent for load in loads]),
+            first=np.cumsum([0] + [len(index) for index, _ in entries]).astype(np.int64),
+            coordinate=np.concatenate([np.zeros(0, dtype=np.int64), *(index for index, _ in entries)]),
+            wave=np.stack([waves.real, waves.imag], axis=1),
+            first_row=np.cumsum([0] + [len(load.curve) for load in loads]).astype(np.int64),
+            table=np.array(rows, dtype=np.float64).reshape(-1, 3),
+        )
+
+    def _entries(
+        self, name: str, body: str, position: tuple[float, float, float] | None, wrench: Complexes
+    ) -> tuple[Integers, Complexes]:
+        """Coordinates (k,) and generalized forces (k,) of a force and moment (6,), N and N m, on a body at a place (m).
+
+        Without a place they act at its main seat, or at the body. Coordinates that the body does not have are left out.
+        """
+        where = self.coordinates.get(body, (-1,) * BODY_SIZE)
+        arm = np.zeros(3)
+        elastic = self.elastic_bodies.get(body)
+        if position is not None and elastic is None:
+            arm = position - node_position(next(own for own in self.gearbox.bodies(self.inertias) if own.name == body))
+        elif position is not None and elastic is not None:
+            places = {seat.name: np.array(seat.position) for seat in elastic.reduced.seats}
+            seat = elastic.shared_seats.get(name, name)
+            if seat not in places:
+                seat = elastic.main_seat
+            where = self.coordinates[seat_key(body, seat)]
+            arm = position - places[seat]
+        acting = np.append(wrench[:3], wrench[3:] + np.cross(arm, wrench[:3]))
+        index = np.array(where, dtype=np.int64)
+        moves = (index >= 0) & (acting != 0.0)
+        return index[moves], acting[moves]
 
     def torque_vector(self, torques: Mapping[str, float]) -> Floats:
         """Generalized forces of torques about the bodies' spin axes (N m), shape (size,)."""
@@ -563,6 +598,8 @@ def input_hash(assembly: Assembly, load_case: str | None = None) -> str:
             if element.table is not None
         },
     }
+    if curves := [load.curve for load in gearbox.varying_loads if load.curve]:
+        content["excitation_tables"] = [[[f"{value:.9g}" for value in row] for row in curve] for curve in curves]
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 

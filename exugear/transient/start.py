@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import (
     band_warning,
     bearing_range_warning,
@@ -18,6 +17,7 @@ from exugear.gearbox.load_cases import (
     load_in_words,
     other_load_warning,
     summarise_loads,
+    table_speed_warning,
     torque_series,
 )
 from exugear.gearbox.parts import LoadCase
@@ -120,6 +120,8 @@ def prepare_start(plan: RunPlan, resume: bool) -> RunStart:
 
     Raises
     ------
+    GearboxFileError
+        The table of an excitation does not cover the speeds of the load case.
     RunError
         There is nothing to resume, it was run with other choices, or was stopped for good.
     """
@@ -128,6 +130,8 @@ def prepare_start(plan: RunPlan, resume: bool) -> RunStart:
     gearbox = assembly.gearbox
     series = torque_series(gearbox, case)
     summary = summarise_loads(gearbox, case, assembly.inertias, plan.duration, series)
+    if beyond := table_speed_warning(gearbox, summary):
+        raise gearbox.error(beyond)
     judge = ValidityMonitor(assembly, summary)
     layout = signal_layout(assembly)
     if resume:
@@ -148,7 +152,7 @@ def prepare_start(plan: RunPlan, resume: bool) -> RunStart:
         doubts = {"bearing_doubt": doubt, "table_doubt": other, "band_doubt": beyond}
         told = {**doubts, "load": load, "duration": plan.duration}
         pieces = RunPieces(plan.partial_path, layout, {**plan.attributes(), **told})
-    return RunStart(_load_table(case, series, state.start_angle, gearbox), state, pieces, judge, resume)
+    return RunStart(_load_table(case, series, state.start_angle, assembly), state, pieces, judge, resume)
 
 
 def _pieces_to_resume(plan: RunPlan, layout: SignalLayout) -> RunPieces:
@@ -199,9 +203,10 @@ def _first_state(
 
 
 def _load_table(
-    case: LoadCase, series: Mapping[str, tuple[Floats, Floats]], start_angle: float, gearbox: Gearbox
+    case: LoadCase, series: Mapping[str, tuple[Floats, Floats]], start_angle: float, assembly: Assembly
 ) -> LoadTable:
     """Gather what acts from outside; a drive starts ahead by an angle (rad)."""
+    gearbox = assembly.gearbox
     drive = None
     if case.driven_body is not None and case.drive_stiffness is not None:
         drive = Drive(
@@ -210,4 +215,4 @@ def _load_table(
             damping=gearbox.case.damping.coupling_time_s * case.drive_stiffness,
             angle=(start_angle, driven_start_speed(gearbox, case), 0.5 * drive_rate(gearbox, case)),
         )
-    return LoadTable(case.torques, series, drive, gearbox.torque_orders)
+    return LoadTable(case.torques, series, drive, assembly.varying_loads)

@@ -150,6 +150,7 @@ def steady(
         typer.Option("--continuation", help="Continuation through turning points (nonlinear)."),
     ] = False,
     quantity: options.QuantityOption = None,
+    without: options.WithoutOption = None,
     out: options.OutOption = None,
     allow_dir: options.FilesBelowOption = None,
     scripts: options.ScriptsOption = False,
@@ -163,7 +164,7 @@ def steady(
     from exugear.cli.case import open_project
     from exugear.cli.tasks import steady as task
 
-    project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias, load_case)
+    project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias, load_case, without or ())
     if load_case is not None:
         project = project.at_load_case(load_case)
     asked = task.speeds_of_options(project, speeds, points)
@@ -257,6 +258,7 @@ def run(
         ),
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Resume an interrupted run.")] = False,
+    without: options.WithoutOption = None,
     out: options.OutOption = None,
     allow_dir: options.FilesBelowOption = None,
     scripts: options.ScriptsOption = False,
@@ -271,7 +273,7 @@ def run(
     from exugear.cli.case import open_project
     from exugear.cli.tasks import run as task
 
-    project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias, load_case)
+    project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias, load_case, without or ())
     if at_load_case:
         project = project.at_load_case(task.load_case_of(project).name)
     task.run(

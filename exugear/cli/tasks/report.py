@@ -194,7 +194,7 @@ def _outcome(folder: Path, written: Report, study: DesignStudy | None) -> Outcom
     verdict = written.statements[0] if written.statements else "No results to summarise"
     if written.headline is not None:
         headline = written.headline
-        verdict = highest_resonance(headline.ranking)
+        verdict = highest_resonance(written.gearbox, headline.ranking)
         model = f"{headline.choice.variant}, {headline.source}"
         tables.insert(0, resonance_table(written.gearbox, headline.ranking, model))
     findings = [*written.findings, *(Finding("warning", f"skipped: {line}") for line in written.left_out)]

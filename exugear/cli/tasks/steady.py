@@ -13,7 +13,7 @@ import xarray as xr
 
 from exugear.cli.case import assembled_by_iso, check_friction, steady_lack
 from exugear.cli.console import BadInputError, FailedError, not_converged_failure
-from exugear.cli.resonances import highest_resonance, resonance_table
+from exugear.cli.resonances import highest_resonance, resonance_table, source_table
 from exugear.cli.sound_tables import sound_line, sound_tables
 from exugear.cli.tables import Outcome, significant
 from exugear.cli.watched import WatchedProject
@@ -99,11 +99,12 @@ def steady(project: WatchedProject, settings: SteadySettings, quantity: str | No
     sound = summary["sound"]
     near = [mesh for mesh in str(data.attrs["near_unconverged_states"]).split(", ") if mesh]
     Outcome(
-        verdict=highest_resonance(ranking) if summary["excited"] else "No excitation",
+        verdict=highest_resonance(gearbox, ranking) if summary["excited"] else "No excitation",
         further=[sound_line(sound)] if sound else [],
         summary=summary,
         tables=[
             resonance_table(gearbox, ranking, f"{summary['variant']}, {summary['method']}"),
+            *filter(None, [source_table(gearbox, data)]),
             *(sound_tables(sound) if sound else ()),
         ],
         findings=[
@@ -173,6 +174,7 @@ def summarise(
             for peak in peaks(data)
             if peak.amplitude > LEAST_AMPLITUDE
         ],
+        "sources_of_overall_dte": json.loads(data.attrs["contributions"]) if project.gearbox.varying_loads else [],
         "sound": _sound(data, ranking) if excited else None,
         "file": str(project.steady_path(settings)),
         "neglected_shuttling": [

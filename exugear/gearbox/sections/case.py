@@ -31,6 +31,7 @@ from exugear.gearbox.sections.entries import (
     Section,
     Text,
 )
+from exugear.gearbox.sections.excitations import ExcitationSection
 from exugear.gearbox.sections.gears import DeviationSection, GearSection, PairSection, PinSection
 from exugear.gearbox.sections.loads import LoadsSection, LubricantSection, RatingSection
 from exugear.gearbox.sections.measurements import MeasurementSection
@@ -101,37 +102,6 @@ class ForceSection(Section):
     def _acts(self) -> ForceSection:
         if not any((*self.force_N, *self.moment_N_m)):
             raise ValueError("set force_N = [x, y, z] or moment_N_m = [x, y], not all zero")
-        return self
-
-
-class ExcitationSection(Section):
-    """Torque on a rotating body that varies with its angle: ripple of an electric machine, an engine, a propeller.
-
-    The torque is the sum of torque_N_m cos(order x angle + phase) over the orders, in addition to constant torques. It
-    acts in runs, and in steady-state responses with the methods `linear` and `parametric`.
-    """
-
-    body: Name
-    """Body on which it acts."""
-    orders: Annotated[tuple[q.ShaftOrder, ...], Field(strict=False, min_length=1, max_length=200)]
-    """Periods per revolution of the body; with `pole_pairs`, per electrical revolution."""
-    torque_N_m: Annotated[tuple[q.RippleNm, ...], Field(strict=False, min_length=1, max_length=200)]
-    """Amplitude of each order, zero to peak."""
-    phase_deg: Annotated[tuple[q.AngleDeg, ...], Field(strict=False, max_length=200)] = ()
-    """Phase of each order at zero angle of the body; zero by default."""
-    pole_pairs: q.PolePairs = 1
-    """Factor on the orders: pole pairs of an electric machine."""
-    enabled: bool = True
-    """Whether it acts."""
-    description: Text = ""
-    """Description for the user."""
-
-    @model_validator(mode="after")
-    def _amplitudes(self) -> ExcitationSection:
-        if len(self.torque_N_m) != len(self.orders):
-            raise ValueError(f"set as many torque_N_m as orders: {len(self.torque_N_m)} for {len(self.orders)} orders")
-        if self.phase_deg and len(self.phase_deg) != len(self.orders):
-            raise ValueError(f"set as many phase_deg as orders: {len(self.phase_deg)} for {len(self.orders)} orders")
         return self
 
 

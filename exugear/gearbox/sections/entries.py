@@ -99,9 +99,14 @@ ElementsAround = Annotated[int, Range(6, 400, (6, 120), "finer meshes fill any m
 Sectors = Annotated[int, Range(3, 63, (3, 31), "each is a seat of six coordinates")]
 NodeNumber = Annotated[int, Range(-(10**9), 10**9, why="numbers of nodes in a finite-element model")]
 AngleDeg = Annotated[float, Range(-3600.0, 3600.0, (-720.0, 720.0))]
-ShaftOrder = Annotated[int, Range(1, 2000, (1, 500), "periods per revolution, a whole number")]
+ShaftOrder = Annotated[float, Range(0.5, 2000.0, (0.5, 500.0), "periods per revolution, a whole number or a half")]
 PolePairs = Annotated[int, Range(1, 200, (1, 60))]
 RippleNm = Annotated[float, Range(0.0, 1e9, (0.0, 1e7), "amplitude, zero to peak")]
+RipplePercent = Annotated[float, Range(0.0, 1000.0, (0.0, 100.0), "percent of the static torque; above it, teeth part")]
+SpeedExponent = Annotated[float, Range(0.0, 6.0, (0.0, 3.0), "power of the speed, 2 for a propeller")]
+UnbalanceGMm = Annotated[
+    float, Range(1e-9, 1e13, (1e-3, 1e10), "mass times distance; 1 kg mm are 1000 g mm, 1 kg m are 1e6 g mm")
+]
 Phase = Annotated[float, _symmetric_range(1000.0, 10.0, "in mesh cycles")]
 
 # Masses, from watch gears to the rotors of hydro generators.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -31,7 +32,7 @@ DESCRIBED_ENERGY, MIN_ENERGY = 0.8, 0.1
 SHOWN_ELEMENTS = 2
 """Maximum number of elements in a strain energy list."""
 _HARMONIC = re.compile(r"(?:(\d+) × )?[^ ]+")
-_ROTATION = re.compile(r"(?:(\d+) × )?rotation of (\S+)(?: in (\S+))?")
+_ROTATION = re.compile(r"(?:(\d+) × )?(half )?rotation of (\S+)(?: in (\S+))?")
 _COPY = re.compile(r"^(.*)_(\d+)$")
 _OF = re.compile(r"(?<= of )\w+")
 _NAME = re.compile(r"\w+(?:-\w+)*")
@@ -159,29 +160,52 @@ class Labels:
     def line(self, line: OrderLine) -> str:
         """Return a short label of an order: harmonic and mesh."""
         if _HARMONIC.fullmatch(line.name) is None:
-            return self.labelled(line.name)
+            return self.labelled(line.name) + self.causes(line.order)
         harmonic, mesh = self._split(line)
-        if harmonic == 1:
-            return mesh
-        return f"{harmonic} × {mesh}"
+        return f"{mesh if harmonic == 1 else f'{harmonic} × {mesh}'}{self.causes(line.order)}"
 
     def line_sentence(self, line: OrderLine) -> str:
         """Return an order as a noun phrase, such as "the 2nd harmonic of the mesh high-speed"."""
         if rotation := _ROTATION.fullmatch(line.name):
-            return self._rotation_sentence(int(rotation[1] or 1), *rotation.groups()[1:])
+            times = int(rotation[1] or 1) * (0.5 if rotation[2] else 1.0)
+            return self._rotation_sentence(times, *rotation.groups()[2:]) + self.causes(line.order, "excitation ")
         if _HARMONIC.fullmatch(line.name) is None:
-            return f"the combination {self.labelled(line.name)}"
+            return f"the combination {self.labelled(line.name)}{self.causes(line.order, 'excitation ')}"
         harmonic, mesh = self._split(line)
         ordinal = {1: "mesh frequency", 2: "2nd harmonic", 3: "3rd harmonic"}.get(harmonic, f"{harmonic}th harmonic")
-        return f"the {ordinal} of the mesh {mesh}"
+        return f"the {ordinal} of the mesh {mesh}{self.causes(line.order, 'excitation ')}"
 
-    def _rotation_sentence(self, order: int, body: str, carrier: str | None) -> str:
-        """Return an order of a body's rotation as a noun phrase, with the torques of the file that have this order."""
-        torques = [own.excitation for own in self._gearbox.torque_orders if (own.body, own.order) == (body, order)]
-        causes = f" (excitation {', '.join(map(self.of, torques))})" if torques else ""
-        ordinal = {1: "1st", 2: "2nd", 3: "3rd"}.get(order, f"{order}th")
+    def causes(self, order: float, before: str = "") -> str:
+        """Name the excitations of the file at an order of the input in parentheses; empty if there are none.
+
+        Parameters
+        ----------
+        before : text before the names
+
+        Examples
+        --------
+        >>> ripple = {"body": "hss", "orders": [6], "torque_N_m": [5.0]}
+        >>> grc = Gearbox.from_toml("cases/grc750/gearbox.toml").varied({"excitations": {"air_gap": ripple}})
+        >>> words = Labels(grc)
+        >>> words.causes(6 * grc.train.ratio), words.causes(6.0)
+        (' (air gap)', '')
+        """
+        loads = self._gearbox.varying_loads
+        if not loads:
+            return ""
+        speeds = self._gearbox.train.rolling_speeds(self._gearbox.case.overall.input, 1.0)
+        acting = [
+            own.excitation for own in loads if math.isclose(own.order * abs(speeds[own.body]), order, rel_tol=1e-6)
+        ]
+        return f" ({before}{', '.join(map(self.of, dict.fromkeys(acting)))})" if acting else ""
+
+    def _rotation_sentence(self, order: float, body: str, carrier: str | None) -> str:
+        """Return an order of a body's rotation as a noun phrase."""
+        ordinal = {1.0: "1st order", 2.0: "2nd order", 3.0: "3rd order"}.get(order, f"{order:g}th order")
+        if order % 1.0:
+            ordinal = f"order {order:g}"
         frame = f" in {self.of(carrier)}" if carrier else ""
-        return f"the {ordinal} order of the rotation of {self.of(body)}{frame}{causes}"
+        return f"the {ordinal} of the rotation of {self.of(body)}{frame}"
 
     def pairs(self, line: OrderLine) -> tuple[int, list[str]]:
         """Return the harmonic of an order and the families of the meshes that excite it; none for a combination."""

@@ -1,4 +1,4 @@
-"""Excitations at the orders of shafts: pitch deviations and run-out of gears, and stated torques.
+"""Excitations at the orders of shafts: pitch deviations and run-out of gears, and stated loads.
 
 A deviation e of a gear is subtracted from the deflection d of its meshes, so that the force of a mesh is
 
@@ -7,42 +7,46 @@ A deviation e of a gear is subtracted from the deflection d of its meshes, so th
 and -k e - c e' is a given force at the orders n of the shaft. The stiffness k varies with the mesh cycle, which brings
 the sidebands h z +- n of the mesh orders h z of a gear with z teeth. The normal of a flank with deviations is not that
 of the perfect one: by the work along e, the static force F_0 has the torque F_0 de/dphi on the gear, which is given,
-too. The averaged system itself has no deviations. A stated torque on a body is given like this one.
+too. The averaged system itself has no deviations. A stated load on a body, such as an unbalance, is given like this
+one.
 
 Meshes of planets are waves around the carrier (`exugear.steady.mean_system.mesh_waves`), so that a deviation of order n
-against the carrier appears at n plus and minus multiples of the carrier's rotation.
+against the carrier appears at n plus and minus multiples of the carrier's rotation. So does a load on one planet.
 """
 
 from __future__ import annotations
 
+import cmath
 import itertools
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from exugear.gearbox.parts import TorqueOrder
 from exugear.steady.harmonics.lines import SAME, LineSet, Rotation, Sidebands, fourier_coefficients, largest
 from exugear.steady.mean_system.mesh_waves import MeshWaves
 from exugear.steady.mean_system.planet_sets import PlanetSet
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.system.kernels.meshes import FRAME
+from exugear.system.kernels.varying_loads import VaryingLoadArrays, no_varying_loads, size_and_phase
 from exugear.system.system import Assembly
-from fe_ste.tools.arrays import Complexes, Floats, Integers
+from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
 
 NEGLECTED = 1e-2
 """Share of the root mean square of a mesh component's deviations in orders that are left out."""
 SAMPLES_PER_PIECE = 4
 """Samples of each cubic piece of a deviation for its Fourier coefficients; pieces are a fraction of a tooth."""
 REACH = 4
-"""Harmonics of each mesh frequency whose sidebands a stated torque has."""
+"""Harmonics of each mesh frequency whose sidebands a stated load has."""
 LEAST = 1e-9
 """Share of the largest coefficient below which one is zero but for round-off."""
 
 
 @dataclass(frozen=True, eq=False)
 class ShaftOrders:
-    """Deviations of gears and stated torques as Fourier series of the angles of rotations; without any, it is empty.
+    """Deviations of gears and stated loads as Fourier series of the angles of rotations; without any, it is empty.
 
     Values hold where the input turns about +z; where it turns about -z, they are the conjugates.
     """
@@ -56,28 +60,60 @@ class ShaftOrders:
     displacement: Complexes = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
     """(t, m) deviations of the mesh components, m."""
     reaction: Complexes = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
-    """(t, size) generalized forces in the rotating frame, by the static forces on deviations and of stated torques."""
+    """(t, size) generalized forces in the rotating frame, by the static forces on deviations and of stated loads, these
+    per size at a speed."""
     source: tuple[str, ...] = ()
-    """(t,) name of the stated torque that a term is of; empty for deviations."""
+    """(t,) name of the excitation that a term is of; empty for deviations."""
+    loads: VaryingLoadArrays = field(default_factory=no_varying_loads)
+    """Stated loads, for their sizes over the speed."""
+    load: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    """(t,) stated load of a term, -1 for deviations."""
+    speeds: Floats = field(default_factory=lambda: np.zeros(0))
+    """(l,) speed of the body of each stated load over that of the input."""
+    angles: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    """(l, size) angle of that body by the static deflections, at zero angle of the input."""
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the rotations."""
         return tuple(rotation.name for rotation in self.rotations)
 
-    def at_lines(self, values: Complexes, lines: LineSet, meshes: int, speed: float) -> Complexes:
-        """Coefficients (n, ...) of a Fourier series (t, ...) at lines, of which `meshes` bases are meshes."""
-        found = np.zeros((len(lines.index), *values.shape[1:]), dtype=complex)
-        if not len(values):
-            return found
-        multiples = np.zeros((len(values), lines.index.shape[1]), dtype=np.int64)
+    def reaction_at(self, speed: float, static: Floats) -> Complexes:
+        """Generalized forces (t, size) at a speed of the input (rad/s) and static deflections (size,)."""
+        factors = np.ones(len(self.load), dtype=complex)
+        angles = self.loads.order * (self.angles @ static) if len(self.angles) else np.zeros(0)
+        for n in np.unique(self.load[self.load >= 0]).tolist():
+            size, phase = size_and_phase(n, speed * self.speeds[n], self.loads)
+            factors[self.load == n] = cmath.rect(size, phase + angles[n])
+        return np.asarray(self.reaction * factors[:, None])
+
+    def places(self, lines: LineSet, meshes: int) -> Places:
+        """Places of the terms in lines of which `meshes` bases are meshes."""
+        multiples = np.zeros((len(self.multiples), lines.index.shape[1]), dtype=np.int64)
         multiples[:, meshes:] = self.multiples
         place, mirrored = lines.find(multiples)
-        values = values if speed > 0.0 else values.conj()
-        there = place >= 0
-        turned = np.where(mirrored[:, None], values.conj(), values)
-        np.add.at(found, place[there], turned[there])
-        return found
+        return Places(place, mirrored, (place == 0) & multiples.any(axis=1))
+
+
+class Places(NamedTuple):
+    """Places of terms among lines."""
+
+    line: Integers
+    mirrored: Booleans
+    """(t,) line of a term, -1 for none, and whether the term counts as its conjugate there."""
+    halved: Booleans
+    """(t,) whether a term of opposite rotations stands still, so that it counts with its conjugate."""
+
+
+def at_lines(values: Complexes, places: Places, lines: int, speed: float) -> Complexes:
+    """Sum up terms (t, ...) at the places of a number of lines (lines, ...); for a negative speed their conjugates."""
+    found = np.zeros((lines, *values.shape[1:]), dtype=complex)
+    values = values if speed > 0.0 else values.conj()
+    there = places.line >= 0
+    turned = np.where(places.mirrored[:, None], values.conj(), values)
+    turned = np.where(places.halved[:, None], 2.0 * turned.real, turned)
+    np.add.at(found, places.line[there], turned[there])
+    return found
 
 
 def without_deviations(assembly: Assembly) -> Assembly:
@@ -89,7 +125,7 @@ def without_deviations(assembly: Assembly) -> Assembly:
 
 
 def shaft_orders(assembly: Assembly, waves: MeshWaves) -> ShaftOrders:
-    """Find the deviations of an assembly's gears and the stated torques, and the orders that matter.
+    """Find the deviations of an assembly's gears and the stated loads, and the orders that matter.
 
     Parameters
     ----------
@@ -99,13 +135,15 @@ def shaft_orders(assembly: Assembly, waves: MeshWaves) -> ShaftOrders:
     series = _Series(assembly, waves)
     for meshes, planets in waves.groups:
         series.add_family(meshes, planets)
-    for order in assembly.gearbox.torque_orders:
-        series.add_torque(order)
+    for n in range(len(assembly.gearbox.varying_loads)):
+        series.add_load(n)
     return series.found()
 
 
 Key = tuple[tuple[str, int], ...]
 """Multiples of rotations by their names, without zeros."""
+DEVIATION = -1
+"""Number of deviations among the stated loads."""
 
 
 class _Series:
@@ -120,8 +158,8 @@ class _Series:
         self.load = waves.mean_stiffness * (waves.values(assembly.meshes.deflection, speed) - waves.rest)
         self.orders = {name: modulator.order for name, modulator in waves.carriers}
         """Order of each rotation, by its name; those of carriers whose planets mesh out of phase come first."""
-        self.displacement: dict[tuple[str, Key], Complexes] = {}
-        self.reaction: dict[tuple[str, Key], Complexes] = {}
+        self.displacement: dict[tuple[int, Key], Complexes] = {}
+        self.reaction: dict[tuple[int, Key], Complexes] = {}
         self.beside: list[tuple[Key, int, int | None]] = []
         """Rotations, the base of the mesh beside whose harmonics they appear, and the highest of these."""
 
@@ -135,21 +173,22 @@ class _Series:
                 orders = self._orders(mesh, end)
                 if not orders:
                     continue
-                teeth = self._wheel(mesh, end)[1]
+                body, teeth = self._wheel(mesh, end)
+                frame = self.assembly.elements[mesh].mesh.frame
                 turning = self._turning(mesh, end, planets, place, len(own))
                 for (order, value), (turn, shape, row) in itertools.product(orders, turning):
                     if order == 0 and turn < 0:
                         continue  # the conjugate of that which turns the other way
-                    key = self._key(mesh, end, planets, order, turn)
+                    key = self._key(body, frame, planets, order, turn)
                     displaced = np.zeros(len(waves), dtype=complex)
                     displaced[own] = value * shape
                     pushed = 1j * order * value * self.load[own[0]] * row
                     if not key and (order or turn):  # at rest it counts with its conjugate
                         displaced, pushed = (2.0 * part.real.astype(complex) for part in (displaced, pushed))
-                    self._add(self.displacement, ("", key), displaced)
-                    self._add(self.reaction, ("", key), pushed)
+                    self._add(self.displacement, (DEVIATION, key), displaced)
+                    self._add(self.reaction, (DEVIATION, key), pushed)
                     # Orders at the same distance from a mesh order are sidebands of one kind.
-                    nearest = self._key(mesh, end, planets, order - teeth * round(order / teeth), turn)
+                    nearest = self._key(body, frame, planets, order - teeth * round(order / teeth), turn)
                     sizes[nearest] = math.hypot(sizes.get(nearest, 0.0), float(np.linalg.norm(displaced)))
         sizes.pop((), None)
         if sizes:
@@ -158,20 +197,44 @@ class _Series:
             base = waves[own[0]].base
             self.beside += [(key, base, None) for key, is_kept in zip(sizes, kept, strict=True) if is_kept]
 
-    def add_torque(self, torque: TorqueOrder) -> None:
-        """Add a torque that varies with the angle of a body."""
-        speed = self.frame.speeds.get(torque.body, 0.0)
-        place = self.assembly.spin[torque.body]
-        if speed == 0.0:
+    def add_load(self, number: int) -> None:
+        """Add a stated load, which varies with the angle of a body."""
+        load = self.assembly.gearbox.varying_loads[number]
+        if self.frame.speeds.get(load.body, 0.0) == 0.0:
             return
-        name = f"rotation of {torque.body}"
-        self.orders.setdefault(name, abs(speed))
-        key = ((name, torque.order * int(math.copysign(1.0, speed))),)
-        phase = torque.phase + torque.order * self.still[place]
-        row = self.frame.matrices(0.0)[0][place]
-        self._add(self.displacement, (torque.excitation, key), np.zeros(len(self.waves.waves), dtype=complex))
-        self._add(self.reaction, (torque.excitation, key), 0.5 * torque.amplitude * np.exp(1j * phase) * row)
-        self.beside += [(key, base, REACH) for base in range(len(self.waves.base_orders))]
+        arrays = self.assembly.varying_loads
+        entries = slice(arrays.first[number], arrays.first[number + 1])
+        wave = np.zeros(self.assembly.size, dtype=complex)
+        wave[arrays.coordinate[entries]] = arrays.wave[entries] @ (0.5, 0.5j)
+        for key, turned in self._in_frame(load.body, load.order, wave):
+            self._add(self.displacement, (number, key), np.zeros(len(self.waves.waves), dtype=complex))
+            self._add(self.reaction, (number, key), turned)
+            self.beside += [(key, base, REACH) for base in range(len(self.waves.base_orders))]
+
+    def _in_frame(self, body: str, order: float, wave: Complexes) -> list[tuple[Key, Complexes]]:
+        """Multiples of rotations, and generalized forces (size,) in the rotating frame, of a load on a body."""
+        planets = next((planets for planets in self.frame.sets if body in planets.names), None)
+        if planets is None:
+            speed = self.frame.speeds[body]
+            whole = order == int(order)
+            rotation = {f"rotation of {body}": (int(order), speed)} if whole else {}
+            half = {f"half rotation of {body}": (int(2.0 * order), 0.5 * speed)} if not whole else {}
+            return [(self._multiples(rotation | half), self._turned(0.0, wave))]
+        # The waves around the carrier turn with it, and so do radius and tangent.
+        most = planets.waves // 2 + 1
+        samples = 2 * most + 1
+        angles = 2.0 * np.pi * np.arange(samples) / samples
+        turned = np.fft.fft([self._turned(angle / planets.ratio, wave) for angle in angles], axis=0) / samples
+        least = LEAST * np.abs(turned).max()
+        return [
+            (self._key(body, planets.carrier, planets, int(order), int(order) + turn), turned[turn])
+            for turn in range(-most, most + 1)
+            if np.abs(turned[turn]).max() > least
+        ]
+
+    def _turned(self, psi: float, wave: Complexes) -> Complexes:
+        """Generalized forces (size,) in the rotating frame at an angle of the input, rad."""
+        return np.asarray(self.frame.matrices(psi)[0].T @ wave)
 
     def found(self) -> ShaftOrders:
         """Return what was collected."""
@@ -184,13 +247,18 @@ class _Series:
 
         if not self.displacement:
             return ShaftOrders()
+        loads = self.assembly.gearbox.varying_loads
         return ShaftOrders(
             tuple(Rotation(name, self.orders[name]) for name in names[carriers:]),
             tuple(Sidebands(row(key), base, reach) for key, base, reach in self.beside),
             np.array([row(key) for _, key in self.displacement], dtype=np.int64).reshape(len(self.displacement), -1),
             np.array(list(self.displacement.values())),
             np.array([self.reaction[term] for term in self.displacement]),
-            tuple(source for source, _ in self.displacement),
+            tuple("" if n == DEVIATION else loads[n].excitation for n, _ in self.displacement),
+            self.assembly.varying_loads,
+            np.array([n for n, _ in self.displacement], dtype=np.int64),
+            np.array([self.frame.speeds.get(load.body, 0.0) for load in loads]),
+            self.frame.matrices(0.0)[0][self.assembly.varying_loads.turning],
         )
 
     def _wheel(self, mesh: int, end: int) -> tuple[str, int]:
@@ -239,12 +307,10 @@ class _Series:
         of_rows = np.fft.fft(np.array(rows), axis=0) / samples
         return [(turn, of_shapes[turn], of_rows[turn]) for turn in range(-most, most + 1)]
 
-    def _key(self, mesh: int, end: int, planets: PlanetSet | None, order: int, turn: int) -> Key:
-        """Multiples of rotations of a term: of the gear against its frame, and of the carrier."""
-        body = self._wheel(mesh, end)[0]
-        frame = self.assembly.elements[mesh].mesh.frame
+    def _key(self, body: str, frame: str, planets: PlanetSet | None, order: int, turn: int) -> Key:
+        """Multiples of rotations: of a body against its frame, and of the carrier of planets."""
         relative = self.frame.speeds.get(body, 0.0) - self.frame.speeds.get(frame, 0.0)
-        multiples: dict[str, int] = {}
+        rotations: dict[str, tuple[int, float]] = {}
         if order:
             name = f"rotation of {body}"
             if planets is not None:
@@ -252,18 +318,25 @@ class _Series:
                 name = f"rotation of {family} in {planets.carrier}"
                 if abs(abs(relative) - abs(planets.ratio)) < SAME * abs(relative):
                     name = self._carrier(planets)
-            self.orders.setdefault(name, abs(relative))
-            multiples[name] = order * int(math.copysign(1.0, relative))
+            rotations[name] = order, relative
         if turn and planets is not None:
             name = self._carrier(planets)
-            self.orders.setdefault(name, abs(planets.ratio))
-            multiples[name] = multiples.get(name, 0) + turn * int(math.copysign(1.0, planets.ratio))
-        return tuple(sorted((name, multiple) for name, multiple in multiples.items() if multiple))
+            before = rotations.get(name, (0, planets.ratio))
+            same = math.copysign(1.0, before[1] * planets.ratio)
+            rotations[name] = turn + int(same) * before[0], planets.ratio
+        return self._multiples(rotations)
+
+    def _multiples(self, rotations: Mapping[str, tuple[int, float]]) -> Key:
+        """Multiples of rotations, given with the speed of each over that of the input; a new one becomes a base."""
+        for name, (_, speed) in rotations.items():
+            self.orders.setdefault(name, abs(speed))
+        signed = {name: order * int(math.copysign(1.0, speed)) for name, (order, speed) in rotations.items()}
+        return tuple(sorted((name, multiple) for name, multiple in signed.items() if multiple))
 
     def _carrier(self, planets: PlanetSet) -> str:
         """Name of the rotation of a carrier: its own where its planets mesh out of phase."""
         out_of_phase = [name for name, _ in self.waves.carriers]
         return planets.carrier if planets.carrier in out_of_phase else f"rotation of {planets.carrier}"
 
-    def _add(self, terms: dict[tuple[str, Key], Complexes], key: tuple[str, Key], value: Complexes) -> None:
+    def _add(self, terms: dict[tuple[int, Key], Complexes], key: tuple[int, Key], value: Complexes) -> None:
         terms[key] = terms[key] + value if key in terms else value

@@ -18,6 +18,7 @@ from exugear.system.kernels.elastic import set_elastic_motion
 from exugear.system.kernels.modal_damping import add_modal_damping
 from exugear.system.kernels.rolling import CAGE_TORQUE, ELASTIC_PART, RollingArrays, rolling_force
 from exugear.system.kernels.turning import place_travelling, set_turning_motion, share_travelling_forces
+from exugear.system.kernels.varying_loads import add_varying_loads
 from exugear.system.tooth_mesh.laws.mesh_forces import add_meshes
 from exugear.transient.compiled.packing import (
     ANGLE,
@@ -477,9 +478,7 @@ def set_loads(t: float, q: Floats, v: Floats, loads: Loads, series: Integers, f:
         angle = law[ANGLE] + t * (law[SPEED] + t * law[HALF_ACCELERATION])
         speed = law[SPEED] + 2.0 * t * law[HALF_ACCELERATION]
         f[i] += law[STIFFNESS] * (angle - q[i]) + law[DAMPING] * (speed - v[i])
-    for n in range(loads.turning.shape[0]):
-        i = loads.turning[n, 0]
-        f[i] += loads.ripple[n, 0] * math.cos(loads.turning[n, 1] * q[i] + loads.ripple[n, 1])
+    add_varying_loads(q, v, loads.varying, f)
 
 
 @kernel

@@ -31,6 +31,7 @@ from exugear.system.kernels.products import filled_up
 from exugear.system.kernels.rolling import RollingArrays, rolling_memory
 from exugear.system.kernels.table_law import DAMPING_SIZE, NOMINAL_DEFLECTION, NOMINAL_MISALIGNMENT, scratch_memory
 from exugear.system.kernels.turning import TravellingArrays, TurningArrays, travelling_memory, turning_memory
+from exugear.system.kernels.varying_loads import VaryingLoadArrays, no_varying_loads
 from exugear.system.loads import LoadTable
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.registry import LAWS
@@ -148,10 +149,8 @@ class Loads(NamedTuple):
     law: Floats
     """(d, 5) stiffness (N m/rad), damping (N m s/rad), and the angle that the drive follows: its value (rad), speed
     and half the acceleration at t = 0."""
-    turning: Integers
-    """(o, 2) coordinate whose angle a torque varies with and on which it acts, and its order."""
-    ripple: Floats
-    """(o, 2) amplitude (N m) and phase (rad) of that torque."""
+    varying: VaryingLoadArrays
+    """Loads that vary with the angle of a body."""
 
 
 class Joints(NamedTuple):
@@ -479,8 +478,7 @@ def _loads(assembly: Assembly, loads: LoadTable) -> Loads:
         torque=np.concatenate([np.zeros(0)] + [torques for _, torques in series]),
         drive=np.array([assembly.spin[d.body] for d in drive], dtype=np.int64),
         law=np.array([(d.stiffness, d.damping, *d.angle) for d in drive]).reshape(-1, 5),
-        turning=np.array([(assembly.spin[o.body], o.order) for o in loads.orders], dtype=np.int64).reshape(-1, 2),
-        ripple=np.array([(o.amplitude, o.phase) for o in loads.orders]).reshape(-1, 2),
+        varying=no_varying_loads() if loads.varying is None else loads.varying,
     )
 
 

@@ -32,6 +32,7 @@ from exugear.system.kernels.connectors import add_connector_forces
 from exugear.system.kernels.coordinates import SPIN, SpringArrays, add_spring_forces
 from exugear.system.kernels.meshes import MeshArrays
 from exugear.system.kernels.modal_damping import add_modal_damping, modal_memory
+from exugear.system.kernels.varying_loads import VaryingLoadArrays, add_varying_loads
 from exugear.system.system import Assembly
 from exugear.transient.exudyn_model.library import elements, exudyn, items
 from fe_ste.tools.arrays import Floats
@@ -169,8 +170,15 @@ class FloatingBodies:
                 assembly_q[in_assembly], assembly_v[in_assembly] = q[in_solver], v[in_solver]
         return assembly_q, assembly_v, motions
 
-    def add_forces(self, mbs: Any, nodes: list[Any], meshes: MeshArrays | None, applied: Law) -> None:
-        """Add one object on all nodes for meshes, and for all else that acts on the floating bodies.
+    def add_forces(
+        self,
+        mbs: Any,
+        nodes: list[Any],
+        meshes: MeshArrays | None,
+        applied: Law,
+        varying: VaryingLoadArrays | None,
+    ) -> None:
+        """Add one object on all nodes for meshes and loads over angles, and for all else on the floating bodies.
 
         Parameters
         ----------
@@ -178,6 +186,7 @@ class FloatingBodies:
         nodes : of all bodies in the order of the assembly's coordinates
         meshes : None leaves them out
         applied : what acts from outside, on any coordinates; taken for the floating bodies alone
+        varying : loads that vary with the angle of a body, on any coordinates
         """
         assembly = self._assembly
         connectors = assembly.connectors.chosen(self.connectors)
@@ -187,7 +196,10 @@ class FloatingBodies:
         memory = modal_memory(assembly.modal)
 
         def supports(t: float, q: Floats, v: Floats) -> Floats:
-            f = np.where(self._is_floating, applied(t, q, v) + assembly.constant_forces, 0.0)
+            over_angles = np.zeros(assembly.size)
+            if varying is not None:
+                add_varying_loads(q, v, varying, over_angles)
+            f = np.where(self._is_floating, applied(t, q, v) + assembly.constant_forces, over_angles)
             add_connector_forces(q, v, connectors, f)
             add_spring_forces(q, v, springs, f)
             if assembly.modal is not None:

@@ -17,6 +17,7 @@ from exugear.system.kernels.coordinates import BODY_SIZE, SPIN, SpringArrays
 from exugear.system.kernels.meshes import ROW_SIZE, MeshArrays
 from exugear.system.kernels.modal_damping import add_modal_damping, modal_matrix, modal_memory
 from exugear.system.kernels.rolling import CAGE_TORQUE, ELASTIC_PART, rolling_force, rolling_memory
+from exugear.system.kernels.varying_loads import VaryingLoadArrays, add_varying_loads
 from exugear.system.loads import LoadTable
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.mesh_forces import add_mesh_forces
@@ -140,24 +141,18 @@ def add_loads(parts: Parts, loads: LoadTable) -> None:
                     loadUserFunction=_load_function(loads, name),
                 )
             )
-    by_state: list[tuple[str, float, float, Callable[[float, float, float], float]]] = [
-        (body, 0.0, 0.0, _torque_over_angle(loads, body))
-        for body in dict.fromkeys(order.body for order in loads.orders)
-    ]
-    if loads.drive is not None:
-        by_state.append((loads.drive.body, loads.drive.stiffness, loads.drive.damping, loads.drive.torque))
-    for body, stiffness, damping, law in by_state:
-        if body not in elsewhere:
-            fixed = parts.mbs.AddNode(items.NodePointGround())
-            ground = parts.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=fixed, coordinate=0))
-            parts.mbs.AddObject(
-                items.CoordinateSpringDamper(
-                    markerNumbers=[ground, parts.spin_marker(body)],
-                    stiffness=stiffness,
-                    damping=damping,
-                    springForceUserFunction=_torque_function(law),
-                )
+    drive = loads.drive
+    if drive is not None and drive.body not in elsewhere:
+        fixed = parts.mbs.AddNode(items.NodePointGround())
+        ground = parts.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=fixed, coordinate=0))
+        parts.mbs.AddObject(
+            items.CoordinateSpringDamper(
+                markerNumbers=[ground, parts.spin_marker(drive.body)],
+                stiffness=drive.stiffness,
+                damping=drive.damping,
+                springForceUserFunction=_torque_function(drive.torque),
             )
+        )
 
 
 def _torque_function(torque: Callable[[float, float, float], float]) -> Callable[..., float]:
@@ -165,12 +160,25 @@ def _torque_function(torque: Callable[[float, float, float], float]) -> Callable
     return lambda mbs, t, item, u, v, k, d, offset: -torque(t, u, v)
 
 
-def _torque_over_angle(loads: LoadTable, body: str) -> Callable[[float, float, float], float]:
-    return lambda t, angle, speed: loads.torque_of_orders(body, angle)
-
-
 def _load_function(loads: LoadTable, body: str) -> Callable[[Any, float, float], float]:
     return lambda mbs, t, load: loads.torque(body, t)
+
+
+def add_varying_loads_element(parts: Parts, loads: VaryingLoadArrays) -> None:
+    """Add the one object for loads over angles, on all nodes in the order of the assembly's coordinates."""
+
+    def force(mbs: Any, t: float, item: int, q: Any, v: Any) -> Floats:
+        f = np.zeros(parts.assembly.size)
+        add_varying_loads(np.array(q), np.array(v), loads, f)
+        return f
+
+    def jacobian(mbs: Any, t: float, item: int, q: Any, v: Any, factor_q: float, factor_v: float) -> Floats:
+        # Their derivatives are small against stiffness and inertia: Newton's method converges without them.
+        return np.zeros((parts.assembly.size, parts.assembly.size))
+
+    parts.mbs.AddObject(
+        items.ObjectGenericODE2(nodeNumbers=parts.all_nodes, forceUserFunction=force, jacobianUserFunction=jacobian)
+    )
 
 
 def add_mesh_element(parts: Parts, meshes: MeshArrays) -> None:

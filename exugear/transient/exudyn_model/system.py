@@ -34,6 +34,7 @@ from exugear.transient.exudyn_model.forces import (
     add_minimal_system,
     add_modal_element,
     add_supports,
+    add_varying_loads_element,
 )
 from exugear.transient.exudyn_model.library import SolverFailure, exudyn
 from fe_ste.tools.arrays import Floats, Integers
@@ -107,11 +108,14 @@ class ExudynSystem:
         if parts.floating is None:
             add_modal_element(parts)
         add_loads(parts, self.loads)
+        if parts.floating is None and self.loads.varying is not None and self.loads.varying.turning.size:
+            add_varying_loads_element(parts, self.loads.varying)
         if self.assembly.variant.is_constrained:
             for joint in self.assembly.gearbox.joints:
                 add_joint(parts, joint)
         if parts.floating is not None:
-            parts.floating.add_forces(self.mbs, parts.all_nodes, meshes, partial(self.loads.generalized, self.assembly))
+            applied = partial(self.loads.generalized, self.assembly)
+            parts.floating.add_forces(self.mbs, parts.all_nodes, meshes, applied, self.loads.varying)
         elif meshes is not None and mesh_route == "element":
             add_mesh_element(parts, meshes)
         elif meshes is not None:

@@ -26,7 +26,7 @@ def compiled_states(
     """States by the compiled solver under constant torques (N m) and those over angles that the file states."""
     out_q, out_v = np.empty((2, steps + 1, assembly.size))
     out_q[0], out_v[0] = q, v
-    loads = LoadTable(load, orders=assembly.gearbox.torque_orders)
+    loads = LoadTable(load, varying=assembly.varying_loads)
     done = CompiledSystem(assembly, q, v, loads, step).advance(0, out_q[1:], out_v[1:])
     assert done == steps
     return out_q, out_v
@@ -42,7 +42,7 @@ def exudyn_states(
         rows.append(np.array([q, v]))
         return True
 
-    loads = LoadTable(load, orders=assembly.gearbox.torque_orders)
+    loads = LoadTable(load, varying=assembly.varying_loads)
     ExudynSystem(assembly, q, v, loads).run(0.0, steps, step, keep, assembly.variant != "jointed")
     states = np.array(rows)
     return states[:, 0], states[:, 1]

@@ -44,6 +44,8 @@ def bases(folder: Path) -> dict[str, dict[str, Any]]:
     write_plate(folder / "plate.vtu")
     (folder / "series.csv").write_text("time_s,shaft_1_N_m\n0.0,100.0\n1.0,120.0\n", encoding="utf-8")
     (folder / "flank.csv").write_text("radius_mm,-7.0,7.0\n29.0,1.0,0.0\n31.0,0.0,2.0\n", encoding="utf-8")
+    rows = "".join(f"{speed},6,{0.01 * speed},5.0\n" for speed in (0, 1000, 2000))
+    (folder / "ripple.csv").write_text(f"speed_rpm,order,amplitude_N_m,phase_deg\n{rows}", encoding="utf-8")
     grc = tomllib.loads((GRC / "gearbox.toml").read_text(encoding="utf-8"))
     return {
         "grc": grc,
@@ -66,7 +68,15 @@ def _with_errors(grc: dict[str, Any]) -> dict[str, Any]:
     }
     case["pins"] = {"first": {"body": "planet_1", "radial_um": 30.0, "tangential_um": -40.0}}
     ripple = {"body": "hss", "orders": [6, 12], "torque_N_m": [30.0, 12.0], "phase_deg": [0.0, 45.0], "pole_pairs": 2}
-    case["excitations"] = {"ripple": ripple | {"enabled": True, "description": "generator"}}
+    growth = {"speed_exponent": 2.0, "reference_speed_rpm": 22.0}
+    blades = {"body": "lss", "z_mm": 200.0, "orders": [3], "force_N": [[50.0, 0.0, 9.0]], "moment_N_m": [[4.0, 0.0]]}
+    case["excitations"] = {
+        "ripple": ripple | {"enabled": True, "description": "generator"},
+        "blades": blades | {"direction": "fixed"},
+        "unbalance": {"body": "planet_1", "z_mm": 100.0, "unbalance_g_mm": 500.0},
+        "machine": {"body": "hss", "table": "ripple.csv", "pole_pairs": 2, "reaction_on": "housing"},
+        "propeller": {"body": "carrier", "orders": [0.5, 5], "torque_percent": [1.0, 4.0]} | growth,
+    }
     case["bodies"]["main_shaft"]["enabled"] = True
     case["ste"] = {"positions": 20, "grid": True, "torque_factors": [0.5, 1.0], "misalignment_um": [0.0, 30.0]}
     return case

@@ -92,7 +92,7 @@ def run_from(model, response, duration, step, torque, assembly=None):
     u = system.static_at(interface.speed) + motion[0].real + 2.0 * motion[1:].sum(axis=0).real
     q, v, _ = system.frame.state(0.0, interface.speed, u, 2.0 * (1j * w * motion[1:]).sum(axis=0).real)
     load = assembly.gearbox.case.static_load
-    loads = LoadTable({**load.torques_N_m, load.locked[0]: torque}, orders=assembly.gearbox.torque_orders)
+    loads = LoadTable({**load.torques_N_m, load.locked[0]: torque}, varying=assembly.varying_loads)
     run = CompiledSystem(assembly, q, v, loads, step)
     steps, every = round(duration / step), 8
     time, overall, angle = [], [], []

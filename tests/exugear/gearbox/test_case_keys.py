@@ -21,6 +21,7 @@ from exugear.gearbox.sections import (
     case,
     connections,
     entries,
+    excitations,
     gears,
     loads,
     measurements,
@@ -74,7 +75,7 @@ LIFE_SECTIONS = (
     measurements.TachoSection,
     measurements.SpeedChannelSection,
 )
-CASE_MODEL = (entries, gears, bodies, connections, case)
+CASE_MODEL = (entries, gears, bodies, connections, excitations, case)
 """Modules of the case model."""
 
 

@@ -80,7 +80,7 @@ def test_both_solvers_have_the_same_torque_over_the_angle():
     q, v = 1e-6 * rng.normal(size=(2, assembly.size))
     q[assembly.spin["shaft_1"]] = 0.7
     v[assembly.spin["shaft_1"]] = 80.0
-    loads = LoadTable({"shaft_1": 100.0}, orders=assembly.gearbox.torque_orders)
+    loads = LoadTable({"shaft_1": 100.0}, varying=assembly.varying_loads)
     applied = loads.generalized(assembly, 0.0, q, v)[assembly.spin["shaft_1"]]
     expected = 100.0 + np.cos(6 * 0.7) + 5.0 * np.cos(12 * 0.7 + np.pi / 6)
     assert applied == pytest.approx(expected, rel=1e-12)
@@ -109,9 +109,9 @@ def test_resonances_of_a_ripple_are_looked_for_even_where_the_mesh_does_not_vary
     ("changes", "said"),
     [
         ({"body": "nowhere"}, "excitations.ripple: no body 'nowhere'"),
-        ({"body": "ground"}, "excitations.ripple.body = 'ground': a torque on the ground has no effect"),
+        ({"body": "ground"}, "excitations.ripple.body = 'ground': a load on the ground has no effect"),
         ({"orders": [0, 6]}, "excitations.ripple.orders"),
-        ({"orders": [1.5, 6]}, "excitations.ripple.orders"),
+        ({"orders": [1.25, 6]}, "excitations.ripple: orders: 1.25 is neither a whole number nor a half"),
         ({"torque_N_m": [1.0]}, "set as many torque_N_m as orders: 1 for 2 orders"),
         ({"phase_deg": [1.0]}, "set as many phase_deg as orders: 1 for 2 orders"),
         ({"torque_N_m": [1.0, float("nan")]}, "excitations.ripple.torque_N_m"),
@@ -123,7 +123,7 @@ def test_an_impossible_excitation_is_refused_by_its_key(changes, said):
 
 
 def test_a_disabled_torque_does_not_act_and_the_nonlinear_method_is_refused():
-    assert gearbox(enabled=False).torque_orders == ()
+    assert gearbox(enabled=False).varying_loads == ()
     with pytest.raises(SteadyError, match="excitations: the method nonlinear"):
         response_of(spur_assembly(), SteadySettings(SpeedRange(50.0, 150.0, 4), "nonlinear"))
 

@@ -119,10 +119,11 @@ def test_orders_have_one_name_whatever_they_are_read_from(gearbox):
 def test_an_order_of_a_rotation_is_no_combination_and_names_the_torque_of_the_file(grc):
     ripple = {"body": "hss", "orders": [6], "pole_pairs": 2, "torque_N_m": [30.0]}
     words = Labels(grc.varied({"excitations": {"generator": ripple}}))
-    order = words.order("12 x rotation of hss", 978.0)
+    order = words.order("12 x rotation of hss", 12.0 * grc.train.ratio)
     shaft = words.of("hss")
     assert words.line_sentence(order) == f"the 12th order of the rotation of {shaft} (excitation generator)"
     assert words.line_sentence(words.order("rotation of hss", 81.5)) == f"the 1st order of the rotation of {shaft}"
     carried = words.line_sentence(words.order("2 x rotation of planet in carrier", 5.1))
     assert carried == f"the 2nd order of the rotation of {words.of('planet')} in {words.of('carrier')}"
     assert words.pairs(order) == (1, [])
+    assert words.line(order) == "12 × rotation of high-speed shaft (generator)"
