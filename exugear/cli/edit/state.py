@@ -236,6 +236,7 @@ def dynamics(gearbox: Gearbox, modes: Modes, text: str, source: str) -> dict[str
     ]
     warnings = [f"bearings.{duty.family}: {remark}" for duty in duties for remark in duty.remarks]
     warnings += filter(None, [unusual_damping(modes)])
+    loads = [column for column in bearings_task.BEARINGS if not column.is_detail]
     unavailable = "" if state else lacking(gearbox, Variant.bushing)
     return {
         "failed": False,
@@ -243,7 +244,7 @@ def dynamics(gearbox: Gearbox, modes: Modes, text: str, source: str) -> dict[str
         "model": f"{assembly.variant}, mesh stiffness to ISO 6336-1, rigid bodies",
         "unavailable": unavailable,
         "tables": {
-            "bearings": table_data(bearings_task.BEARINGS, rows[::-1], legend=bearings_task.LEGEND),
+            "bearings": table_data(loads, rows[::-1], legend=bearings_task.LEGEND),
             "meshes": table_data(MESHES, _mesh_rows(state) if state else []),
             "modes": _mode_table(modes),
         },

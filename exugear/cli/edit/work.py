@@ -17,7 +17,7 @@ from typing import IO, Any
 from exugear.cli.console import PROGRESS_SIGN, PROGRESS_VARIABLE
 
 KINDS = {
-    "tables": "Transmission error tables",
+    "tables": "Tables",
     "steady": "Steady-state response",
     "report": "Report",
     "changes": "Design changes",

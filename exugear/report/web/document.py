@@ -74,7 +74,7 @@ def licences(names: Sequence[str] = ("uplot", "three")) -> str:
 # Scripts of the pages: small modules, bundled in the order of their imports into one script without addresses
 
 _IMPORT = re.compile(r'^import (\{[^}]*\}) from "\./([a-z_]+)\.js";$', re.MULTILINE)
-_EXPORT = re.compile(r"^export ((?:async )?(?:function|const|class) (\w+))", re.MULTILINE)
+_EXPORT = re.compile(r"^export ((?:async )?(?:function\*?|const|class) (\w+))", re.MULTILINE)
 
 
 @cache

@@ -1,6 +1,6 @@
 // The page of the command `edit`: the text, and all that the program makes of it.
-import { find, make, need, say as toast } from "./dom.js";
-import { keyAt, pointOut, say, setOld, showCampbell, showCheck, showDynamics, showPicture, shown, shownGeometry, stepMode } from "./edit_results.js";
+import { find, make, need, say } from "./dom.js";
+import { keyAt, pointOut, setOld, showCampbell, showCheck, showDynamics, showPicture, shown, shownGeometry, stepMode, tellVerdict } from "./edit_results.js";
 import { ask, results } from "./edit_server.js";
 import { beginSlider, followCursor } from "./edit_slider.js";
 import { correct, correctionText, goToKey, goToLine, keyAtCursor, makeEditor, putText, showRemarks } from "./edit_text.js";
@@ -22,7 +22,7 @@ const editor = makeEditor(need("text"), { changed: onText, moved: onCursor, save
 const text = () => editor.state.doc.toString();
 const isSaved = () => text() === file.text;
 const goTo = (/** @type {string} */ key) => {
-  if (!goToKey(editor, key)) toast(`${key} is not in the text`);
+  if (!goToKey(editor, key)) say(`${key} is not in the text`);
   showSide("text");
 };
 
@@ -48,7 +48,7 @@ async function compute() {
   running = true;
   do {
     again = false;
-    if (!shown.parts.length) say("Computing. The first start after an installation takes half a minute.", "");
+    if (!shown.parts.length) tellVerdict("Computing. The first start after an installation takes half a minute.", "");
     try {
       for await (const step of results(text(), shownGeometry())) {
         if (step.step === "check") showCheck(step, goTo);
@@ -59,7 +59,7 @@ async function compute() {
         if (again && step.step !== "check") break;
       }
     } catch (error) {
-      say(error instanceof Error && error.message ? error.message : "The server does not answer.", "bad");
+      tellVerdict(error instanceof Error && error.message ? error.message : "The server does not answer.", "bad");
     }
     document.documentElement.setAttribute("data-ready", "");
   } while (again);
@@ -72,8 +72,8 @@ function tell(step) {
   const errors = remarks.filter(({ kind }) => kind === "error").length;
   const warnings = remarks.length - errors;
   const counted = (/** @type {number} */ count, /** @type {string} */ word) => `${count} ${word}${count > 1 ? "s" : ""}`;
-  if (errors) say(`${counted(errors, "error")}. Grey results belong to an earlier state without errors.`, "bad");
-  else if (step.step === "check") say(`No errors. ${step.ratio}${warnings ? `, ${counted(warnings, "warning")}` : ""}.`, warnings ? "mind" : "good");
+  if (errors) tellVerdict(`${counted(errors, "error")}. Grey results belong to an earlier state without errors.`, "bad");
+  else if (step.step === "check") tellVerdict(`No errors. ${step.ratio}${warnings ? `, ${counted(warnings, "warning")}` : ""}.`, warnings ? "mind" : "good");
   else if (warnings) need("verdict").className = "mind";
   const list = need("remarks");
   list.replaceChildren(...remarks.map(remarkItem));
@@ -102,9 +102,9 @@ async function save() {
   if (response.ok) {
     Object.assign(file, { text: saved, digest: content.digest });
     onTextState();
-    toast("Saved");
+    say("Saved");
   } else if (response.status === 409) offer(content.file.digest);
-  else toast(content.error);
+  else say(content.error);
 }
 
 function onTextState() {
@@ -134,7 +134,7 @@ async function load(words) {
   need("conflict").hidden = true;
   putText(editor, content.text, first);
   onTextState();
-  if (words) toast(words);
+  if (words) say(words);
 }
 
 /** Text that is not saved survives a reload of the page. */
@@ -190,7 +190,7 @@ async function begin() {
   await load("");
   if (draft !== null && draft !== text()) {
     putText(editor, draft);
-    toast("Text that was not saved is here again");
+    say("Text that was not saved is here again");
   }
   if (!text()) void compute();
   beginWork(isSaved, noticeFile);

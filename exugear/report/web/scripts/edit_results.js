@@ -27,7 +27,7 @@ export function setOld(steps, old) {
 }
 
 /** @param {string} words @param {"good" | "bad" | "mind" | ""} kind */
-export function say(words, kind) {
+export function tellVerdict(words, kind) {
   const verdict = need("verdict");
   verdict.textContent = words;
   verdict.className = kind;
@@ -93,6 +93,7 @@ export function chooseMode(mode) {
 }
 
 export function showCampbell() {
+  need("mode-number").textContent = `Mode ${state.mode + 1}`;
   if (shown.campbell) drawCampbell(need("campbell"), shown.campbell, state.mode, chooseMode);
   for (const row of document.querySelectorAll("#table-modes tbody tr")) {
     row.classList.toggle("chosen", row instanceof HTMLElement && row.dataset.key === String(state.mode));

@@ -32,8 +32,10 @@ export function followCursor(editor) {
   held = numberAtCursor(editor);
   const key = keyAtCursor(editor);
   const about = described(key);
-  need("key-name").textContent = key;
-  need("key-about").textContent = about ? `${about.about}. ${about.meaning}` : "";
+  if (about) {
+    need("key-name").textContent = key;
+    need("key-about").textContent = `${about.about}. ${about.meaning}`;
+  }
   need("slider-row").hidden = !held;
   if (!held) return;
   const value = Number(held.text.replaceAll("_", ""));
