@@ -6,7 +6,8 @@ import json
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from functools import cache
+from typing import Literal
 
 from exugear.gearbox.sections.schema.keys import keys
 
@@ -14,7 +15,7 @@ _PART = r"""(?:[A-Za-z0-9_-]+|"[^"\n]*"|'[^'\n]*')"""
 _DOTTED = rf"{_PART}(?:\s*\.\s*{_PART})*"
 _HEADER = re.compile(rf"\s*(\[\[?)\s*({_DOTTED})\s*\]")
 _PAIR = re.compile(rf"\s*({_DOTTED})\s*=")
-_QUOTED = re.compile(r'''"(?:[^"\\\n]|\\.)*"|'[^'\n]*'|\#[^\n]*''')
+_QUOTED = re.compile(r""""(?:[^"\\\n]|\\.)*"|'[^'\n]*'|\#[^\n]*""")
 _LONG_QUOTES = ('"""', "'''")
 
 
@@ -132,34 +133,37 @@ def _correction(message: str, key: str, known: Mapping[str, int]) -> tuple[str, 
     """Return old and new text of the only possible correction of an error; empty texts if there is none."""
     if message.endswith(": this key is missing"):
         table, _, name = key.rpartition(".")
-        example = _examples().get((re.sub(r"^(\w+)\.\w+", r"\1.NAME", table), name))
+        of_kind = re.sub(r"^(\w+)\.\w+", r"\1.NAME", table)
+        keys_of_kind = (one for one in schema_for_completion() if one["table"] == of_kind)
+        example = next((one["example"] for one in keys_of_kind if one["name"] == name), "")
         # An inline table has no line below its header.
         return ("", f"{name} = {example}") if example and table in known else ("", "")
     meant = _MEANT.search(message)
     if meant and (value := _VALUE.search(message)):
         return f'"{value[1]}"', f'"{meant[1]}"'
     found = meant or _RENAMED.search(message)
-    return (key.rpartition(".")[2], found[1]) if found and "unknown key" in message or found and not meant else ("", "")
+    if found and (not meant or "unknown key" in message):
+        return key.rpartition(".")[2], found[1]
+    return "", ""
 
 
-def _examples() -> dict[tuple[str, str], str]:
-    """Return examples of values in TOML notation, by table and key; those of tables are left out."""
-    return {
-        (key.table, key.name): json.dumps(key.example) for key in keys() if isinstance(key.example, bool | int | float | str | list)
-    }
+@cache
+def schema_for_completion() -> tuple[dict[str, str], ...]:
+    """Return table, name, description, meaning and example of each key of a gearbox file.
 
-
-def schema_for_completion() -> list[dict[str, Any]]:
-    """Return table, name, unit, type, range, default, meaning and example of each key of a gearbox file."""
-    return [
-        {
-            "table": key.table,
-            "name": key.name,
-            "about": "; ".join(
-                filter(None, [key.kind, key.unit, key.range, key.default if key.default == "required" else f"default {key.default}"])
-            ),
-            "meaning": " ".join(key.meaning.split()),
-            "example": json.dumps(key.example) if isinstance(key.example, bool | int | float | str | list) else "",
-        }
-        for key in keys()
-    ]
+    The example is in TOML notation; it is empty for tables.
+    """
+    listed = []
+    for key in keys():
+        default = key.default if key.default == "required" else f"default {key.default}"
+        simple = isinstance(key.example, bool | int | float | str | list)
+        listed.append(
+            {
+                "table": key.table,
+                "name": key.name,
+                "about": "; ".join(filter(None, [key.kind, key.unit, key.range, default])),
+                "meaning": " ".join(key.meaning.split()),
+                "example": json.dumps(key.example) if simple else "",
+            }
+        )
+    return tuple(listed)

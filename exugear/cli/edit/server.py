@@ -22,7 +22,7 @@ from typing import Any
 
 from exugear.cli.edit.page import edit_page
 from exugear.cli.edit.state import Analyst
-from exugear.cli.edit.stored import EditedFile, FileConflictError
+from exugear.cli.edit.stored import EditedFile, FileConflictError, digest_of
 from exugear.cli.edit.work import KINDS, BusyError, LongWork
 from exugear.gearbox.named_files import LARGEST_CASE, Permissions
 from exugear.gearbox.reading import GearboxFileError
@@ -196,13 +196,22 @@ class Handler(BaseHTTPRequestHandler):
             server.file.save(str(content.get("text", "")), str(content.get("digest", "")))
             self._send_json(server.file.told())
         elif path == "start" and content.get("kind") in KINDS:
-            server.work.start(content["kind"], server.file.told()["digest"])
+            self._start(str(content["kind"]))
             self._send_json({"work": server.work.told()})
         elif path == "cancel":
             server.work.cancel()
             self._send_json({"work": server.work.told()})
         else:
             raise RefusedError(HTTPStatus.NOT_FOUND, "no such page")
+
+    def _start(self, kind: str) -> None:
+        """Start a long computation of the saved file."""
+        server = self.server
+        text = server.file.text()
+        gearbox = server.analyst.check(text).gearbox
+        if gearbox is None:
+            raise RefusedError(HTTPStatus.CONFLICT, "the saved file has errors; correct them and save it first")
+        server.work.start(kind, digest_of(text))
 
     def _content(self) -> dict[str, Any]:
         """Read the JSON object of a request."""

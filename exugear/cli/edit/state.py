@@ -113,8 +113,7 @@ class Analyst:
         dict
             For JSON, with the key ``step``: ``check``, ``dynamics`` and ``picture``, or ``superseded``.
         """
-        request = object()
-        self._latest[tab] = request
+        request = self.ask(tab)
         digest = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
         with self._lock:
             kept = self._kept.pop(digest, [])
@@ -134,6 +133,11 @@ class Analyst:
             self._kept[digest] = done
             while len(self._kept) > KEPT:
                 del self._kept[next(iter(self._kept))]
+
+    def ask(self, tab: str) -> object:
+        """Register a request of a tab, which ends the one before."""
+        self._latest[tab] = request = object()
+        return request
 
     def _made(self, text: str) -> Iterator[dict[str, Any]]:
         checked = self.check(text)
@@ -182,7 +186,9 @@ def checked_data(checked: CheckedText) -> dict[str, Any]:
         "ratio": gearbox.train.ratio_text,
         "tables": {
             **kinematics(gearbox),
-            "pairs": table_data(check_task.PAIRS, pairs, "pairs", check_task.PAIR_LEGEND + " " + check_task.PAIR_DETAILS),
+            "pairs": table_data(
+                check_task.PAIRS, pairs, "pairs", check_task.PAIR_LEGEND + " " + check_task.PAIR_DETAILS
+            ),
             "thickness": table_data(check_task.THICKNESSES, check_task.thickness_summaries(gearbox), "gears"),
         },
         "parts": parts_of(gearbox),
@@ -197,7 +203,12 @@ def kinematics(gearbox: Gearbox) -> dict[str, Any]:
     speed = rated or (ends[1] / RPM if ends else GREATEST_SPEED)
     spins = gearbox.train.rolling_speeds(case.overall.input, speed * RPM)
     speeds = [
-        {"body": name, "speed_rpm": spin / RPM, "ratio": spin / (speed * RPM), "key": f"bodies.{_family(gearbox, name)}"}
+        {
+            "body": name,
+            "speed_rpm": spin / RPM,
+            "ratio": spin / (speed * RPM),
+            "key": f"bodies.{_family(gearbox, name)}",
+        }
         for name, spin in spins.items()
     ]
     frequencies = gearbox.train.mesh_frequencies(speed * RPM)
@@ -294,7 +305,11 @@ def campbell(modes: Modes) -> dict[str, Any]:
     ends = operating_range(gearbox)
     return {
         "modes": [
-            {"mode": int(mode), "frequency": rounded(float(modes.frequency[mode]), 6), "weight": rounded(float(weight), 3)}
+            {
+                "mode": int(mode),
+                "frequency": rounded(float(modes.frequency[mode]), 6),
+                "weight": rounded(float(weight), 3),
+            }
             for mode, weight in zip(diagram.seen, diagram.weights, strict=True)
         ],
         "orders": {name: rounded(order, 8) for name, order in diagram.orders.items()},
@@ -387,5 +402,3 @@ def table_data(
         "rows": rows,
         "legend": legend,
     }
-
-

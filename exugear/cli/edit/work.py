@@ -12,7 +12,7 @@ import time
 from collections import deque
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from exugear.cli.console import PROGRESS_SIGN, PROGRESS_VARIABLE
 
@@ -79,14 +79,16 @@ class LongWork:
         self._lock = threading.Lock()
         self._task: LongTask | None = None
 
-    def arguments(self, kind: str) -> list[str]:
-        """Return the arguments of the command of a long computation."""
+    def commands(self, kind: str) -> list[list[str]]:
+        """Return the arguments of the commands of a long computation; stored results that fit are not repeated."""
         of_case = [str(self._case), "--out", str(self._folder), *self._permitted]
+        steady = ["steady", *of_case]
+        report = ["report", str(self._folder), *self._permitted]
         return {
-            "tables": ["ste", *of_case],
-            "steady": ["steady", *of_case],
-            "report": ["report", str(self._folder), *self._permitted],
-            "changes": ["report", str(self._folder), "--levers", *self._permitted],
+            "tables": [["ste", *of_case]],
+            "steady": [steady],
+            "report": [steady, report],
+            "changes": [steady, [*report, "--levers"]],
         }[kind]
 
     def start(self, kind: str, digest: str) -> None:
@@ -100,34 +102,9 @@ class LongWork:
         with self._lock:
             if self.running:
                 raise BusyError("another computation is running; wait for it or cancel it")
-            program = "from exugear.cli.app import main; main()"
-            process = subprocess.Popen(
-                # -P: modules in the current folder, which may be a stranger's, are not imported.
-                [sys.executable, "-P", "-c", program, *self.arguments(kind)],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                text=True,
-                encoding="utf-8",
-                errors="replace",
-                env={**os.environ, PROGRESS_VARIABLE: "1", "COLUMNS": "100"},
-                # Ctrl-C in the terminal is for the server, which then ends the command itself.
-                start_new_session=True,
-            )
-            self._task = LongTask(kind, digest, process, time.monotonic())
-        threading.Thread(target=self._follow, args=(self._task,), daemon=True).start()
-
-    def _follow(self, task: LongTask) -> None:
-        """Read the output of a command until it ends."""
-        output: IO[str] | None = task.process.stdout
-        assert output is not None
-        for line in output:
-            if line.startswith(PROGRESS_SIGN):
-                task.progress = json.loads(line[1:])
-            elif line.strip():
-                task.lines.append(line.rstrip("\n"))
-        task.process.wait()
-        task.seconds = time.monotonic() - task.began
+            first, *others = self.commands(kind)
+            self._task = LongTask(kind, digest, _begun(first), time.monotonic())
+        threading.Thread(target=_follow, args=(self._task, others), daemon=True).start()
 
     @property
     def running(self) -> bool:
@@ -144,10 +121,7 @@ class LongWork:
         if task is None or task.seconds is not None:
             return
         task.cancelled = True
-        if sys.platform == "win32":
-            task.process.terminate()
-        else:
-            task.process.send_signal(signal.SIGINT)
+        _interrupt(task.process)
         threading.Thread(target=_kill_later, args=(task,), daemon=True).start()
 
     def end(self) -> None:
@@ -155,6 +129,51 @@ class LongWork:
         self.cancel()
         if self._task is not None:
             _kill_later(self._task)
+
+
+def _begun(arguments: list[str]) -> subprocess.Popen[str]:
+    """Start a command of this program."""
+    program = "from exugear.cli.app import main; main()"
+    return subprocess.Popen(
+        # -P: modules in the current folder, which may be a stranger's, are not imported.
+        [sys.executable, "-P", "-c", program, *arguments],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        encoding="utf-8",
+        errors="replace",
+        env={**os.environ, PROGRESS_VARIABLE: "1", "COLUMNS": "100"},
+        # Ctrl-C in the terminal is for the server, which then ends the command itself.
+        start_new_session=True,
+    )
+
+
+def _follow(task: LongTask, others: list[list[str]]) -> None:
+    """Read the output of a command until it ends, then those of the following ones while all succeed."""
+    while True:
+        assert task.process.stdout is not None
+        with task.process.stdout as output:
+            for line in output:
+                if line.startswith(PROGRESS_SIGN):
+                    task.progress = json.loads(line[1:])
+                elif line.strip():
+                    task.lines.append(line.rstrip("\n"))
+        if task.process.wait() or task.cancelled or not others:
+            break
+        task.progress = {}
+        task.process = _begun(others.pop(0))
+        if task.cancelled:  # while it was started
+            _interrupt(task.process)
+    task.seconds = time.monotonic() - task.began
+
+
+def _interrupt(process: subprocess.Popen[str]) -> None:
+    """Ask a command to stop."""
+    if sys.platform == "win32":
+        process.terminate()
+    else:
+        process.send_signal(signal.SIGINT)
 
 
 def _kill_later(task: LongTask) -> None:
