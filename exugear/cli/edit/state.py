@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import threading
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -187,7 +187,7 @@ def checked_data(checked: CheckedText) -> dict[str, Any]:
         "tables": {
             **kinematics(gearbox),
             "pairs": table_data(
-                check_task.PAIRS, pairs, "pairs", check_task.PAIR_LEGEND + " " + check_task.PAIR_DETAILS
+                check_task.PAIRS, pairs, "pairs", f"{check_task.PAIR_LEGEND} {check_task.PAIR_DETAILS}"
             ),
             "thickness": table_data(check_task.THICKNESSES, check_task.thickness_summaries(gearbox), "gears"),
         },
@@ -373,10 +373,10 @@ def parts_of(gearbox: Gearbox) -> list[dict[str, Any]]:
         width = bearing.catalogue.width_mm if bearing.catalogue else None
         add(f"bearings.{bearing.family}", bearing.body, bearing.position, 5e-4 * (width or 20.0))
     for mesh in gearbox.meshes:
-        for body, gear in ((mesh.pinion, mesh.pair.pinion), (mesh.gear, mesh.pair.gear)):
-            own = gearbox.named_bodies[body]
+        for name, wheel in ((mesh.pinion, mesh.pair.pinion), (mesh.gear, mesh.pair.gear)):
+            own = gearbox.named_bodies[name]
             for key in (f"meshes.{mesh.family}", f"pairs.{mesh.pair.name}"):
-                add(key, body, (*own.axis, own.wheels[gear.name]), 0.5 * gear.face_width)
+                add(key, name, (*own.axis, own.wheels[wheel.name]), 0.5 * wheel.face_width)
     return list(parts.values())
 
 

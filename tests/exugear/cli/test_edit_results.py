@@ -1,4 +1,4 @@
-"""What `exugear edit` makes of a text: errors at their lines with corrections, the numbers of the commands, no stale step."""
+"""Results of a text in `exugear edit`: errors at their lines with corrections, the numbers of the commands."""
 
 from __future__ import annotations
 
