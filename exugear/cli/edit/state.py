@@ -1,4 +1,4 @@
-"""What the program makes of the text of a gearbox file, in three steps: errors and kinematics, dynamics, picture.
+"""Results of the text of a gearbox file, step by step: errors and kinematics, modes, picture, static loads.
 
 Mesh stiffness is that of ISO 6336-1 and bodies are rigid, so that no finite elements are needed. Nothing is written.
 """
@@ -101,7 +101,7 @@ class Analyst:
         self._latest: dict[str, object] = {}
 
     def steps(self, text: str, tab: str = "", geometry: str = "") -> Iterator[dict[str, Any]]:
-        """Yield the results of a text in three steps; a newer request of the same tab ends an older one.
+        """Yield the results of a text step by step; a newer request of the same tab ends an older one.
 
         Parameters
         ----------
@@ -111,7 +111,7 @@ class Analyst:
         Yields
         ------
         dict
-            For JSON, with the key ``step``: ``check``, ``dynamics`` and ``picture``, or ``superseded``.
+            For JSON, with the key ``step``: ``check``, ``dynamics``, ``picture`` and ``loads``, or ``superseded``.
         """
         request = self.ask(tab)
         digest = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
@@ -149,11 +149,19 @@ class Analyst:
                 variant = usual_variant(checked.gearbox)
                 assembly = assembled_by_iso(checked.gearbox, variant)
                 modes = modes_of(assembly)
-                yield {"step": "dynamics", **dynamics(checked.gearbox, modes, text, self._source)}
+                yield {"step": "dynamics", **dynamics(modes), "remarks": self._warnings([unusual_damping(modes)], text)}
                 yield {"step": "picture", **picture(assembly, modes)}
+                tables, remarks = loads(assembly)
+                unavailable = "" if assembly.variant.has_bearings else lacking(checked.gearbox, Variant.bushing)
+                warnings = self._warnings(remarks, text)
+                yield {"step": "loads", "tables": tables, "unavailable": unavailable, "remarks": warnings}
         except (BadInputError, FailedError) as error:
-            remarks = placed(str(error).splitlines(), "error", self._source, text)
-            yield {"step": "dynamics", "failed": True, "remarks": [asdict(remark) for remark in remarks]}
+            errors = placed(str(error).splitlines(), "error", self._source, text)
+            yield {"step": "dynamics", "failed": True, "remarks": [asdict(remark) for remark in errors]}
+
+    def _warnings(self, lines: Iterable[str], text: str) -> list[dict[str, Any]]:
+        """Return warnings about the text for JSON, without empty and repeated ones."""
+        return [asdict(one) for one in placed(dict.fromkeys(filter(None, lines)), "warning", self._source, text)]
 
     def check(self, text: str) -> CheckedText:
         """Read and check a text."""
@@ -173,7 +181,7 @@ class Analyst:
 
 
 def checked_data(checked: CheckedText) -> dict[str, Any]:
-    """Return the first step: errors and warnings at their lines, and kinematics and geometry if there are no errors."""
+    """Return the step ``check``: errors and warnings at their lines, and kinematics and geometry without errors."""
     told: dict[str, Any] = {"step": "check", "remarks": [asdict(remark) for remark in checked.remarks]}
     gearbox = checked.gearbox
     if gearbox is None:
@@ -236,32 +244,31 @@ def _family(gearbox: Gearbox, name: str) -> str:
     return name if body is None else body.family
 
 
-def dynamics(gearbox: Gearbox, modes: Modes, text: str, source: str) -> dict[str, Any]:
-    """Return the second step: modes, Campbell diagram, bearing loads and misalignment under the static load."""
-    assembly = modes.assembly
+def dynamics(modes: Modes) -> dict[str, Any]:
+    """Return modes and the Campbell diagram."""
+    return {
+        "failed": False,
+        "model": f"{modes.assembly.variant}, mesh stiffness to ISO 6336-1, rigid bodies",
+        "tables": {"modes": _mode_table(modes)},
+        "campbell": campbell(modes),
+        "first": int(np.argmax(modes.overall)),
+    }
+
+
+def loads(assembly: Assembly) -> tuple[dict[str, Any], list[str]]:
+    """Return the tables of bearings and meshes under the static load, and warnings about the bearings."""
     state = static_state(assembly) if assembly.variant.has_bearings else None
-    duties = bearing_duties(assembly) if any(bearing.catalogue for bearing in gearbox.bearings) else ()
+    duties = bearing_duties(assembly) if any(bearing.catalogue for bearing in assembly.gearbox.bearings) else ()
     rows = [
         {**duty_summary(duty), "key": f"bearings.{duty.family}"}
         for duty in {duty.family: duty for duty in reversed(duties)}.values()
     ]
-    warnings = [f"bearings.{duty.family}: {remark}" for duty in duties for remark in duty.remarks]
-    warnings += filter(None, [unusual_damping(modes)])
-    loads = [column for column in bearings_task.BEARINGS if not column.is_detail]
-    unavailable = "" if state else lacking(gearbox, Variant.bushing)
-    return {
-        "failed": False,
-        "remarks": [asdict(one) for one in placed(dict.fromkeys(warnings), "warning", source, text)],
-        "model": f"{assembly.variant}, mesh stiffness to ISO 6336-1, rigid bodies",
-        "unavailable": unavailable,
-        "tables": {
-            "bearings": table_data(loads, rows[::-1], legend=bearings_task.LEGEND),
-            "meshes": table_data(MESHES, _mesh_rows(state) if state else []),
-            "modes": _mode_table(modes),
-        },
-        "campbell": campbell(modes),
-        "first": int(np.argmax(modes.overall)),
+    columns = [column for column in bearings_task.BEARINGS if not column.is_detail]
+    tables = {
+        "bearings": table_data(columns, rows[::-1], legend=bearings_task.LEGEND),
+        "meshes": table_data(MESHES, _mesh_rows(state) if state else []),
     }
+    return tables, [f"bearings.{duty.family}: {remark}" for duty in duties for remark in duty.remarks]
 
 
 def _mesh_rows(state: StaticState) -> Iterator[dict[str, Any]]:
@@ -321,7 +328,7 @@ def campbell(modes: Modes) -> dict[str, Any]:
 
 
 def picture(assembly: Assembly, modes: Modes) -> dict[str, Any]:
-    """Return the third step: bodies and modes for the 3-D view; equal bodies have the same name ``geometry``."""
+    """Return bodies and modes for the 3-D view; equal bodies have the same name ``geometry``."""
     bodies = drawn_bodies(assembly)
     words = Labels(assembly.gearbox)
     geometry = _digest(bodies, words.labels)

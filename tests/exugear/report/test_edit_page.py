@@ -121,6 +121,16 @@ def test_an_error_is_shown_at_its_line_and_its_correction_is_taken(view: EditVie
     assert view.errors == []
 
 
+def test_results_of_an_earlier_text_stay_grey_while_there_is_an_error(view: EditView) -> None:
+    view.type_over("modal_percent = 2.0", 1, "5")
+    view.page.keyboard.type("x")
+    view.page.wait_for_selector("#verdict.bad")
+    view.page.wait_for_timeout(1000)
+    steps = view.page.locator("[data-step]")
+    assert [one.get_attribute("aria-busy") for one in steps.all()] == ["true"] * steps.count()
+    assert view.errors == []
+
+
 def test_keys_are_completed_with_their_meaning(view: EditView) -> None:
     view.type_over("held_diameter_mm = 90.0", 0, "\ntip_d")
     view.page.wait_for_selector(".cm-tooltip-autocomplete >> text=tip_diameter_mm")

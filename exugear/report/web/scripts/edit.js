@@ -1,6 +1,6 @@
 // The page of the command `edit`: the text, and all that the program makes of it.
 import { find, make, need, say } from "./dom.js";
-import { keyAt, pointOut, setOld, showCampbell, showCheck, showDynamics, showPicture, shown, shownGeometry, stepMode, tellVerdict } from "./edit_results.js";
+import { keyAt, pointOut, setOld, showCampbell, showCheck, showDynamics, showLoads, showPicture, shown, shownGeometry, stepMode, tellVerdict } from "./edit_results.js";
 import { ask, results } from "./edit_server.js";
 import { beginSlider, followCursor } from "./edit_slider.js";
 import { correct, correctionText, goToKey, goToLine, keyAtCursor, makeEditor, putText, showRemarks } from "./edit_text.js";
@@ -17,6 +17,10 @@ const file = { text: "", digest: "", offered: "" };
 let running = false;
 let again = false;
 let timer = 0;
+/** Number of the text: results of an earlier one are shown grey. */
+let version = 0;
+/** Results that come one after the other. */
+const STEPS = ["check", "dynamics", "picture", "loads"];
 
 const editor = makeEditor(need("text"), { changed: onText, moved: onCursor, save: () => void save() });
 const text = () => editor.state.doc.toString();
@@ -27,7 +31,8 @@ const goTo = (/** @type {string} */ key) => {
 };
 
 function onText() {
-  setOld(["check", "dynamics", "picture"], true);
+  version += 1;
+  setOld(STEPS, true);
   need("save").classList.toggle("needed", !isSaved());
   need("saved").textContent = isSaved() ? "saved" : "not saved";
   clearTimeout(timer);
@@ -48,14 +53,16 @@ async function compute() {
   running = true;
   do {
     again = false;
+    const mine = version;
     if (!shown.parts.length) tellVerdict("Computing. The first start after an installation takes half a minute.", "");
     try {
       for await (const step of results(text(), shownGeometry())) {
         if (step.step === "check") showCheck(step, goTo);
-        if (step.step === "dynamics") showDynamics(step, goTo);
+        if (step.step === "dynamics") showDynamics(step);
         if (step.step === "picture") await showPicture(step);
-        if (again) setOld(["check", "dynamics", "picture"], true);
-        else tell(step);
+        if (step.step === "loads") showLoads(step, goTo);
+        if (mine === version) tell(step);
+        else setOld(STEPS, true);
         if (again && step.step !== "check") break;
       }
     } catch (error) {
@@ -68,7 +75,7 @@ async function compute() {
 
 /** @param {any} step */
 function tell(step) {
-  const remarks = [...shown.remarks, ...shown.more];
+  const { remarks } = shown;
   const errors = remarks.filter(({ kind }) => kind === "error").length;
   const warnings = remarks.length - errors;
   const counted = (/** @type {number} */ count, /** @type {string} */ word) => `${count} ${word}${count > 1 ? "s" : ""}`;
@@ -79,7 +86,7 @@ function tell(step) {
   list.replaceChildren(...remarks.map(remarkItem));
   list.hidden = !remarks.length;
   showRemarks(editor, remarks);
-  if (step.step !== "check") onCursor();
+  if (step.step === "picture") onCursor();
 }
 
 /** @param {import("./edit_text.js").Remark} remark */

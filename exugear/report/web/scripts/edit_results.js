@@ -13,8 +13,8 @@ const MODEL = "live";
 /** Bodies drawn in the colour of selection, and rings, are for these tables of the file. */
 const PICKED = ["gears", "bearings", "bodies"];
 
-/** @type {{parts: PartData[], remarks: Remark[], more: Remark[], campbell: import("./edit_campbell.js").Campbell | null}} */
-export const shown = { parts: [], remarks: [], more: [], campbell: null };
+/** @type {{parts: PartData[], remarks: Remark[], campbell: import("./edit_campbell.js").Campbell | null}} */
+export const shown = { parts: [], remarks: [], campbell: null };
 
 /** Mark results as those of an earlier state of the text, or as current. @param {string[]} steps @param {boolean} old */
 export function setOld(steps, old) {
@@ -36,7 +36,6 @@ export function tellVerdict(words, kind) {
 /** @param {any} step @param {(key: string) => void} goTo place of a key in the text */
 export function showCheck(step, goTo) {
   shown.remarks = step.remarks;
-  shown.more = [];
   if (!step.ok) return;
   shown.parts = step.parts;
   need("gearbox-name").textContent = step.name;
@@ -45,16 +44,21 @@ export function showCheck(step, goTo) {
 }
 
 /** @param {any} step @param {(key: string) => void} goTo */
-export function showDynamics(step, goTo) {
-  shown.more = step.remarks;
-  if (step.failed) return;
-  for (const [name, table] of Object.entries(step.tables)) {
-    fillTable(name, table, name === "modes" ? (key) => chooseMode(Number(key)) : goTo);
-  }
-  need("model").textContent = `Model: ${step.model}.`;
+export function showLoads(step, goTo) {
+  shown.remarks = [...shown.remarks, ...step.remarks];
+  for (const [name, table] of Object.entries(step.tables)) fillTable(name, table, goTo);
   const lack = need("unavailable");
   lack.textContent = step.unavailable && `No bearing loads and misalignment: ${step.unavailable}`;
   lack.hidden = !step.unavailable;
+  setOld(["loads"], false);
+}
+
+/** @param {any} step */
+export function showDynamics(step) {
+  shown.remarks = [...shown.remarks, ...step.remarks];
+  if (step.failed) return;
+  fillTable("modes", step.tables.modes, (key) => chooseMode(Number(key)));
+  need("model").textContent = `Model: ${step.model}.`;
   const table = step.tables.modes.rows;
   const count = Math.max(...table.map((/** @type {{key: string}} */ row) => Number(row.key) + 1), 0);
   /** @type {import("./page_data.js").ModeData[]} */

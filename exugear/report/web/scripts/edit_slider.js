@@ -32,9 +32,9 @@ export function followCursor(editor) {
   held = numberAtCursor(editor);
   const key = keyAtCursor(editor);
   const about = described(key);
-  if (about) {
+  if (key) {
     need("key-name").textContent = key;
-    need("key-about").textContent = `${about.about}. ${about.meaning}`;
+    need("key-about").textContent = about ? `${about.about}. ${about.meaning}` : "";
   }
   need("slider-row").hidden = !held;
   if (!held) return;
