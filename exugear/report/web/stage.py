@@ -144,7 +144,7 @@ def _moving(
 
 def _reference(assembly: Assembly, body: DrawnBody) -> Floats:
     """Return the reference point of the owner's rigid-body motion: its centre of mass."""
-    own = next((one for one in assembly.gearbox.bodies(assembly.inertias) if one.name == body.owner), None)
+    own = next((one for one in assembly.bodies if one.name == body.owner), None)
     if own is None:
         return body.shape.reference
     return np.array([*own.axis, own.centre_of_mass_z])

@@ -9,7 +9,7 @@ import { beginModeView, drawMode, shownStage } from "./mode_view.js";
 import { beginTheme } from "./theme.js";
 
 /** Pause (ms) after a change before the text is sent. */
-const PAUSE = 60;
+const PAUSE = 30;
 const DRAFT = `exugear-edit ${location.pathname}`;
 
 /** What the file has, as far as this page knows. */

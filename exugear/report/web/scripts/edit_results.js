@@ -132,9 +132,15 @@ function fillTable(name, data, act) {
   note.hidden = !legend;
 }
 
+/** @type {PartData | undefined} */
+let pointed;
+
 /** Point out in the picture what a key of the text is about. @param {string} key */
 export function pointOut(key) {
   const part = shown.parts.find((one) => key === one.key || key.startsWith(`${one.key}.`));
+  // A picture takes a moment to draw on machines without graphics.
+  if (part === pointed) return;
+  pointed = part;
   const flagged = part && !part.key.startsWith("bodies.");
   const [, name] = part?.key.split(".") ?? [];
   const flags = part && flagged ? part.places.map((at) => ({ text: name, at })) : [];
