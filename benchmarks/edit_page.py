@@ -1,7 +1,7 @@
 """Time from a key stroke in the page of `exugear edit` until its results are shown, by gearbox.
 
     python benchmarks/edit_page.py            # prints the table; about two minutes
-    python benchmarks/edit_page.py --write    # also writes it into docs/howto/edit_in_the_browser.md
+    python benchmarks/edit_page.py --write    # also writes it into docs/howto/editor_in_the_browser.md
 
 Measured in the system's chromium, drawn by the processor. Each key adds a digit to a number that changes all modes.
 """
@@ -20,7 +20,7 @@ from timing import CASE, ROOT, environment, machine, median
 
 from exugear.gearbox.templates.kinds import KINDS, template
 
-PAGE = ROOT / "docs" / "howto" / "edit_in_the_browser.md"
+PAGE = ROOT / "docs" / "howto" / "editor_in_the_browser.md"
 MARKS = ("<!-- figures of benchmarks/edit_page.py -->", "<!-- end of figures -->")
 STEPS = {"check": "errors, kinematics", "dynamics": "modes, Campbell diagram", "picture": "picture", "loads": "loads"}
 ROUNDS = 7

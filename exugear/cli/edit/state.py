@@ -42,7 +42,7 @@ from exugear.system.system import Assembly
 KEPT = 6
 """Number of last states whose results are kept, for undo and for a second tab."""
 POINTS_OF_A_BODY = 61
-"""Every so many points of a body are used to find its largest displacement in a mode; no multiple of a tooth's points."""
+"""Every so many points of a body are used to find its largest displacement in a mode."""
 GREATEST_SPEED = 1500.0
 """Input speed (rpm) of the kinematics of a file that specifies neither an operating range nor a rated speed."""
 
