@@ -31,6 +31,7 @@ def main() -> None:
         page.keyboard.press("ArrowDown")
         page.keyboard.press("ArrowDown")
         page.keyboard.press("End")
+        page.evaluate("document.querySelector('.result-side').scrollTop = 0")
         page.wait_for_timeout(1000)
         page.screenshot(path=PICTURE)
         browser.close()

@@ -10,11 +10,11 @@ from __future__ import annotations
 import hmac
 import json
 import secrets
-import socket
+import sys
 import threading
 import time
-from collections.abc import Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Generator, Mapping
+from contextlib import closing, suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -113,9 +113,7 @@ class EditServer(ThreadingHTTPServer):
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Ignore connections that end early; other errors are printed."""
-        import sys
-
-        if not isinstance(sys.exception() if hasattr(sys, "exception") else sys.exc_info()[1], OSError):
+        if not isinstance(sys.exc_info()[1], OSError):
             super().handle_error(request, client_address)
 
 
@@ -135,7 +133,7 @@ class Handler(BaseHTTPRequestHandler):
         """Answer a request with content."""
         self._answered(self._post)
 
-    def _answered(self, answer: Any) -> None:
+    def _answered(self, answer: Callable[[str], None]) -> None:
         try:
             answer(self._permitted_path())
         except RefusedError as error:
@@ -145,7 +143,7 @@ class Handler(BaseHTTPRequestHandler):
         except BusyError as error:
             self._send_json({"error": str(error)}, HTTPStatus.CONFLICT)
         except (GearboxFileError, OSError) as error:
-            if isinstance(error, (ConnectionError, socket.timeout)):
+            if isinstance(error, (ConnectionError, TimeoutError)):
                 raise
             self._send_json({"error": str(error)}, HTTPStatus.INTERNAL_SERVER_ERROR)
 
@@ -245,12 +243,13 @@ class Handler(BaseHTTPRequestHandler):
     def _send_json(self, content: Mapping[str, Any], status: HTTPStatus = HTTPStatus.OK) -> None:
         self._send(json.dumps(content).encode(), "application/json", status)
 
-    def _send_steps(self, steps: Iterable[Mapping[str, Any]]) -> None:
-        """Send each step as a line as soon as it is known."""
-        self._begin("application/x-ndjson", HTTPStatus.OK, {})
-        for step in steps:
-            self.wfile.write(json.dumps(step).encode() + b"\n")
-            self.wfile.flush()
+    def _send_steps(self, steps: Generator[Mapping[str, Any]]) -> None:
+        """Send each step as a line as soon as it is known; the rest is not computed for a page that has gone."""
+        with closing(steps):
+            self._begin("application/x-ndjson", HTTPStatus.OK, {})
+            for step in steps:
+                self.wfile.write(json.dumps(step).encode() + b"\n")
+                self.wfile.flush()
 
     def log_message(self, format: str, *args: Any) -> None:
         """Print nothing."""

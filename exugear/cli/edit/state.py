@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import threading
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -100,7 +100,7 @@ class Analyst:
         self._kept: dict[str, list[dict[str, Any]]] = {}
         self._latest: dict[str, object] = {}
 
-    def steps(self, text: str, tab: str = "", geometry: str = "") -> Iterator[dict[str, Any]]:
+    def steps(self, text: str, tab: str = "", geometry: str = "") -> Generator[dict[str, Any]]:
         """Yield the results of a text step by step; a newer request of the same tab ends an older one.
 
         Parameters

@@ -8,7 +8,7 @@ from collections import deque
 from pathlib import Path
 
 from exugear.cli.case import check_allow_dir
-from exugear.cli.console import BadInputError, check_results_folder, note, say
+from exugear.cli.console import BadInputError, StoppedError, check_results_folder, note, say
 from exugear.cli.edit.server import EditServer
 from exugear.gearbox.reading import read_text
 from exugear.project import default_folder
@@ -35,6 +35,8 @@ def edit(case: Path, out: Path | None, allow_dir: Path | None, port: int, browse
     try:
         server.serve()
         note("No page is open: the server has ended.")
+    except KeyboardInterrupt:
+        raise StoppedError("the editor has ended; finished results are kept") from None
     finally:
         server.server_close()
         server.work.end()

@@ -13,6 +13,8 @@ from typing import Any
 
 import pytest
 
+from exugear.cli.app import app
+from exugear.cli.console import PROGRESS_SIGN, PROGRESS_VARIABLE, progress_bar
 from exugear.cli.edit.server import MOST_BYTES, EditServer
 from exugear.cli.edit.stored import UNSAVED_FILE, EditedFile, FileConflictError, digest_of
 from exugear.gearbox.gearbox import Gearbox
@@ -240,3 +242,44 @@ def test_steady_response_and_report_are_computed_one_after_the_other(server):
     assert (told["state"], told["digest"]) == ("done", digest_of(PAIR)), told["lines"]
     assert server.file.told()["report"] == "current"
     assert b"helical gear pair" in ask(server, own(server, REPORT_FILE))[1]
+
+
+def test_the_server_ends_when_no_page_asks_any_more(tmp_path, monkeypatch):
+    case = tmp_path / "pair.toml"
+    case.write_text(PAIR)
+    monkeypatch.setattr("exugear.cli.edit.server.IDLE", 0.0)
+    server = EditServer(case, tmp_path / "results")
+    server.serve()
+    server.server_close()
+    assert not (tmp_path / "results").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["none.toml"], "no such file; write one to start from by: exugear new"),
+        (["pair.toml", "--port", "{taken}"], "omit it for any free port"),
+        (["pair.toml", "--allow-dir", "none"], "no such folder"),
+        (["pair.toml", "--out", "pair.toml"], "is not a folder"),
+    ],
+)
+def test_what_cannot_be_served_is_bad_input(tmp_path, monkeypatch, capsys, arguments, message):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "pair.toml").write_text(PAIR)
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        given = [word.replace("{taken}", str(taken.getsockname()[1])) for word in arguments]
+        with pytest.raises(SystemExit) as end:
+            app(["edit", *given, "--no-browser"])
+    assert end.value.code == 2
+    assert message in capsys.readouterr().err.replace("\n", " ")
+
+
+def test_a_command_tells_its_progress_to_the_program_that_started_it(monkeypatch, capsys):
+    monkeypatch.setenv(PROGRESS_VARIABLE, "1")
+    with progress_bar() as bar:
+        task = bar.add_task("table", total=4)
+        bar.update(task, completed=3)
+        bar.refresh()
+    lines = [line for line in capsys.readouterr().err.split("\n") if line.startswith(PROGRESS_SIGN)]
+    rows = [json.loads(line[1:]) for line in lines]
+    assert ("table", 3, 4) in [(row["words"], row["done"], row["total"]) for row in rows]
