@@ -9,6 +9,7 @@ Measured in the system's chromium, drawn by the processor. Each key adds a digit
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import subprocess
 import sys
@@ -88,6 +89,7 @@ def main() -> None:
         sys.exit("no chromium: apt-get install chromium")
     lines = ["| gearbox | " + " | ".join(f"{words} / ms" for words in STEPS.values()) + " |"]
     lines.append("| --- |" + " --- |" * len(STEPS))
+    before = os.getloadavg()[0]
     with tempfile.TemporaryDirectory() as folder:
         cases = {"GRC 750": CASE}
         for kind in KINDS:
@@ -98,12 +100,15 @@ def main() -> None:
             lines.append(f"| {name} | " + " | ".join(f"{found[step]:.0f}" for step in STEPS) + " |")
             print(lines[-1], flush=True)
     about = machine()
-    text = "\n".join([*lines, "", f"Medians of {ROUNDS} key strokes on {about['cores']} cores ({about['processor']})."])
+    words = (
+        f"Medians of {ROUNDS} key strokes on {about['cores']} cores ({about['processor']}) without graphics card, load"
+    )
+    text = "\n".join([*lines, "", f"{words}\naverage {before:.1f} at the start."])
     print(text)
     if wanted.write:
-        before, rest = PAGE.read_text(encoding="utf-8").split(MARKS[0])
+        head, rest = PAGE.read_text(encoding="utf-8").split(MARKS[0])
         after = rest.split(MARKS[1])[1]
-        PAGE.write_text(f"{before}{MARKS[0]}\n{text}\n{MARKS[1]}{after}", encoding="utf-8")
+        PAGE.write_text(f"{head}{MARKS[0]}\n{text}\n{MARKS[1]}{after}", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -34,7 +34,7 @@ from exugear.report.web.document import ArrayStore, rounded, rounded_list
 from exugear.report.web.stage import DrawnBody, bodies_data, drawn_bodies, motions_data
 from exugear.results.folder import duty_summary
 from exugear.system.gearbox_checks import gearbox_warnings, lacking, usual_variant
-from exugear.system.modes import Modes, modes_of, unusual_damping
+from exugear.system.modes import CampbellDiagram, Modes, modes_of, unusual_damping
 from exugear.system.operating_points import bearing_duties
 from exugear.system.statics import RIGID_BODY_LIMIT, StaticState, static_state
 from exugear.system.system import Assembly
@@ -245,13 +245,16 @@ def _family(gearbox: Gearbox, name: str) -> str:
 
 
 def dynamics(modes: Modes) -> dict[str, Any]:
-    """Return modes and the Campbell diagram."""
+    """Return modes and the Campbell diagram; the mode shown first is that with the largest share within it."""
+    diagram = modes.campbell()
+    inside = diagram.seen[modes.frequency[diagram.seen] <= diagram.top]
+    first = inside[np.argmax(modes.overall[inside])] if inside.size else np.argmax(modes.overall)
     return {
         "failed": False,
         "model": f"{modes.assembly.variant}, mesh stiffness to ISO 6336-1, rigid bodies",
         "tables": {"modes": _mode_table(modes)},
-        "campbell": campbell(modes),
-        "first": int(np.argmax(modes.overall)),
+        "campbell": campbell(modes, diagram),
+        "first": int(first),
     }
 
 
@@ -305,9 +308,8 @@ def _mode_table(modes: Modes) -> dict[str, Any]:
     return table_data(MODES, rows)
 
 
-def campbell(modes: Modes) -> dict[str, Any]:
+def campbell(modes: Modes, diagram: CampbellDiagram) -> dict[str, Any]:
     """Return the Campbell diagram: frequencies in Hz over the input speed in rpm."""
-    diagram = modes.campbell()
     gearbox = modes.assembly.gearbox
     ends = operating_range(gearbox)
     return {

@@ -33,7 +33,7 @@ export function drawCampbell(figure, data, chosen, choose) {
     box,
     {
       height: 300,
-      padding: [10, 14, 0, 0],
+      padding: [10, 24, 0, 0],
       cursor: { drag: { x: true, y: true, uni: 20 } },
       scales: { x: { time: false, range: (_, low, high) => [low, high] }, y: { range: (_, low, high) => [low, high] } },
       axes: [axisOf("Input speed / rpm"), { ...axisOf("Frequency / Hz"), size: 58 }],
