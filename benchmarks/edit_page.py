@@ -9,7 +9,6 @@ Measured in the system's chromium, drawn by the processor. Each key adds a digit
 from __future__ import annotations
 
 import argparse
-import os
 import re
 import subprocess
 import sys
@@ -17,7 +16,7 @@ import tempfile
 from pathlib import Path
 
 from report_page import ARGUMENTS, CHROMIUM, DESK
-from timing import CASE, ROOT, environment, machine, median
+from timing import CASE, ROOT, environment, load, machine, median
 
 from exugear.gearbox.templates.kinds import KINDS, template
 
@@ -89,7 +88,7 @@ def main() -> None:
         sys.exit("no chromium: apt-get install chromium")
     lines = ["| gearbox | " + " | ".join(f"{words} / ms" for words in STEPS.values()) + " |"]
     lines.append("| --- |" + " --- |" * len(STEPS))
-    before = os.getloadavg()[0]
+    before = load()
     with tempfile.TemporaryDirectory() as folder:
         cases = {"GRC 750": CASE}
         for kind in KINDS:

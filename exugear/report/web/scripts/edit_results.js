@@ -16,6 +16,10 @@ const PICKED = ["gears", "bearings", "bodies"];
 /** @type {{parts: PartData[], remarks: Remark[], campbell: import("./edit_campbell.js").Campbell | null}} */
 export const shown = { parts: [], remarks: [], campbell: null };
 
+/** Time (ms) after which results of an earlier state become grey: most are new before, and nothing flickers. */
+const LATE = 300;
+let late = 0;
+
 /** Mark results as those of an earlier state of the text, or as current. @param {string[]} steps @param {boolean} old */
 export function setOld(steps, old) {
   for (const step of steps) {
@@ -24,6 +28,13 @@ export function setOld(steps, old) {
       part.setAttribute("aria-busy", String(old));
     }
   }
+  // A timer, since a delayed transition keeps the browser drawing.
+  const root = document.documentElement;
+  if (old && !late) late = setTimeout(() => root.setAttribute("data-late", ""), LATE);
+  if (old || document.querySelector("[data-step].old")) return;
+  clearTimeout(late);
+  late = 0;
+  root.removeAttribute("data-late");
 }
 
 /** @param {string} words @param {"good" | "bad" | "mind" | ""} kind */
