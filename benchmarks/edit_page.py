@@ -99,10 +99,9 @@ def main() -> None:
             lines.append(f"| {name} | " + " | ".join(f"{found[step]:.0f}" for step in STEPS) + " |")
             print(lines[-1], flush=True)
     about = machine()
-    words = (
-        f"Medians of {ROUNDS} key strokes on {about['cores']} cores ({about['processor']}) without graphics card, load"
-    )
-    text = "\n".join([*lines, "", f"{words}\naverage {before:.1f} at the start."])
+    where = f"{about['cores']} cores ({about['processor']}) without graphics card"
+    told = [f"Medians of {ROUNDS} key strokes on {where}.", f"Load average at the start: {before}."]
+    text = "\n".join([*lines, "", *told])
     print(text)
     if wanted.write:
         head, rest = PAGE.read_text(encoding="utf-8").split(MARKS[0])
