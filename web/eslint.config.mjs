@@ -9,7 +9,7 @@ export default [
     languageOptions: {
       ecmaVersion: 2022,
       sourceType: "module",
-      globals: { ...globals.browser, uPlot: "readonly", THREE: "readonly" },
+      globals: { ...globals.browser, uPlot: "readonly", THREE: "readonly", CM: "readonly" },
     },
     rules: {
       "no-restricted-properties": [
@@ -30,7 +30,7 @@ export default [
     },
   },
   {
-    files: ["web/*.mjs", "web/three_entry.js"],
+    files: ["web/*.mjs", "web/*_entry.js"],
     languageOptions: { sourceType: "module", globals: globals.node },
   },
 ];

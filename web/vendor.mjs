@@ -14,20 +14,27 @@ for (const name of ["uPlot.iife.min.js", "uPlot.min.css"]) {
 }
 copyFileSync(here("node_modules/uplot/LICENSE"), target("LICENSE.uplot"));
 copyFileSync(here("node_modules/three/LICENSE"), target("LICENSE.three"));
-await build({
-  entryPoints: [here("three_entry.js")],
-  outfile: target("three.min.js"),
-  bundle: true,
-  minify: true,
-  format: "iife",
-  globalName: "THREE",
-  legalComments: "none",
-  charset: "ascii",
-  target: "es2020",
-});
+copyFileSync(here("node_modules/codemirror/LICENSE"), target("LICENSE.codemirror"));
+for (const [name, globalName] of [
+  ["three", "THREE"],
+  ["codemirror", "CM"],
+]) {
+  await build({
+    entryPoints: [here(`${name}_entry.js`)],
+    outfile: target(`${name}.min.js`),
+    bundle: true,
+    minify: true,
+    format: "iife",
+    globalName,
+    legalComments: "none",
+    charset: "ascii",
+    target: "es2020",
+  });
+}
 const listed = [
   ["uplot", ["uPlot.iife.min.js", "uPlot.min.css"]],
   ["three", ["three.min.js"]],
+  ["codemirror", ["codemirror.min.js"]],
 ].map(([name, files]) => ({
   name,
   version: packaged(name).version,

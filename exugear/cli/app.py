@@ -25,6 +25,7 @@ COMMANDS = (
     "files.schema",
     "files.migrate",
     "files.check",
+    "files.edit",
     "models.ste",
     "models.bearings",
     "models.modes",

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from exugear.cli.console import BadInputError, check_results_folder, counted, model_errors, note
 from exugear.cli.options import VARIANT_DESCRIPTIONS
@@ -30,16 +31,27 @@ def read_gearbox(case: Path, allow_dir: Path | None = None, scripts: bool = Fals
     """Read a gearbox file for a command with the user's permissions, check all its parts, and print warnings."""
     check_allow_dir(allow_dir)
     try:
-        content = read_toml(case)
-        try:
-            gearbox = Gearbox.from_dict(content, str(case), Permissions(scripts, allow_dir))
-        except GearboxFileError as error:
-            raise GearboxFileError(*error.errors, *errors_of_bearings(content, str(case))) from None
-        check_parts(gearbox)
+        gearbox = checked_gearbox(read_toml(case), str(case), Permissions(scripts, allow_dir))
     except GearboxFileError as error:
         raise BadInputError(error) from error
     for line in counted([f"Warning: {line}" for line in gearbox_warnings(gearbox)]) if tell else ():
         note(line, style="yellow")
+    return gearbox
+
+
+def checked_gearbox(content: Mapping[str, Any], source: str, permissions: Permissions) -> Gearbox:
+    """Build a gearbox of the content of a file, and check all its parts.
+
+    Raises
+    ------
+    GearboxFileError
+        All errors of the content.
+    """
+    try:
+        gearbox = Gearbox.from_dict(content, source, permissions)
+    except GearboxFileError as error:
+        raise GearboxFileError(*error.errors, *errors_of_bearings(content, source)) from None
+    check_parts(gearbox)
     return gearbox
 
 

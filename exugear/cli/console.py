@@ -21,7 +21,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, NoReturn
 
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.progress import (
     BarColumn,
     Progress,
@@ -151,13 +151,35 @@ class _Transient(Progress):
         self.live.stop()
 
 
+PROGRESS_VARIABLE = "EXUGEAR_PROGRESS"
+"""Environment variable by which a program that starts a command asks for its progress as lines on standard error."""
+PROGRESS_SIGN = "\x1e"
+"""First character of such a line; the rest is a JSON object: words, done, total (None if unknown), left (s or None)."""
+
+
+class _Told(_Transient):
+    """Progress as lines for another program instead of a display."""
+
+    _last = ""
+
+    def get_renderable(self) -> RenderableType:
+        for task in self.tasks[-1:]:
+            row = {"words": task.description, "done": task.completed, "total": task.total, "left": task.time_remaining}
+            if (line := json.dumps(row)) != self._last:
+                self._last = line
+                sys.stderr.write(f"{PROGRESS_SIGN}{line}\n")
+                sys.stderr.flush()
+        return super().get_renderable()
+
+
 def progress_bar() -> Progress:
     """Return a progress bar with the remaining time, to be used as a context manager: one line in 80 columns.
 
     It disappears at its end.
     """
+    kind = _Told if os.environ.get(PROGRESS_VARIABLE) else _Transient
     bar, share, times = (Column(no_wrap=True) for _ in range(3))
-    return _Transient(
+    return kind(
         _Description(),
         BarColumn(14, table_column=bar),
         TaskProgressColumn(table_column=share),

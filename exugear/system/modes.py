@@ -165,6 +165,22 @@ SHOWN_MODES = 12
 
 
 @dataclass(frozen=True)
+class CampbellDiagram:
+    """Modes and mesh orders of a Campbell diagram, and the ends of its axes; m modes."""
+
+    seen: NDArray[np.int64]
+    """(m,) numbers of the modes that participate in the overall transmission error, from 0."""
+    weights: Floats
+    """(m,) size of the marks at the crossings of each mode, 0 to 1."""
+    orders: Mapping[str, float]
+    """Periods per revolution of the input, by name."""
+    fastest: float
+    """Highest speed of the input, rad/s."""
+    top: float
+    """Highest frequency, Hz."""
+
+
+@dataclass(frozen=True)
 class Modes(ReprMixin):
     """Eigenmodes in order of frequency; n modes, in the variant `flexible` those in the band of its elastic bodies."""
 
@@ -258,6 +274,16 @@ class Modes(ReprMixin):
             return draw_energies(self.energies(), ax)
         if kind != "campbell":
             raise ValueError(f"kind = {kind!r}: must be one of campbell, energies")
+        diagram = self.campbell()
+        with axes_or_new(ax, COLUMN_WIDTHS[2], 5.0) as panel:
+            draw_campbell(
+                panel, self.frequency[diagram.seen], diagram.orders, diagram.fastest, diagram.top, diagram.weights
+            )
+            label_curves(panel)
+            return panel
+
+    def campbell(self) -> CampbellDiagram:
+        """Return what the Campbell diagram shows, up to the end of the operating range or the highest mode."""
         gearbox = self.assembly.gearbox
         shares = participation(self.overall)
         seen = (self.frequency > 0.0) & (shares >= VISIBLE)
@@ -269,10 +295,7 @@ class Modes(ReprMixin):
             fastest = operation[1]
             top = min(top, 1.05 * highest * fastest) if highest else top
         weights = (shares[seen] / max(float(shares.max(initial=0.0)), 1e-300)) ** 0.5
-        with axes_or_new(ax, COLUMN_WIDTHS[2], 5.0) as panel:
-            draw_campbell(panel, self.frequency[seen], orders, fastest, top, weights)
-            label_curves(panel)
-            return panel
+        return CampbellDiagram(np.flatnonzero(seen), weights, orders, fastest, top)
 
     def to_dataset(self) -> xr.Dataset:
         """Labelled arrays with units, what `save` writes."""

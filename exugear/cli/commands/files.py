@@ -144,6 +144,27 @@ def check(
         task.check(case, allow_dir, as_json, whole)
 
 
+def edit(
+    case: options.CaseArgument,
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, metavar="N", help="Port of the page. (default: any)", show_default=False)
+    ] = 0,
+    browser: Annotated[
+        bool, typer.Option("--browser/--no-browser", help="Open the page in the browser, or print its address only.")
+    ] = True,
+    out: options.OutOption = None,
+    allow_dir: options.FilesBelowOption = None,
+) -> None:
+    """Edit a gearbox file in the browser and see its results at once.
+
+    The page is served on this machine only and needs no network. The file is written only when you save it. Tables,
+    steady-state response, report and design changes are computed by the other commands when you start them.
+    """
+    from exugear.cli.edit.task import edit as task
+
+    task(case, out, allow_dir, port, browser)
+
+
 def export(
     case: options.CaseArgument,
     rexs: Annotated[

@@ -40,7 +40,7 @@ def check(case: Path, allow_dir: Path | None, as_json: bool, whole: bool) -> Non
     """Check a gearbox file and print its summary."""
     gearbox = _read(case, allow_dir, as_json)
     summary = summarise(gearbox)
-    warnings = [*_scripts(gearbox), *summary["warnings"]]
+    warnings = [*script_notes(gearbox), *summary["warnings"]]
     warnings += [own["span_doubt"] for own in summary["tooth_thickness"] if own["span_doubt"]]
     warnings += [f"load_cases.{own['load_case']}: {line}" for own in summary["load_cases"] for line in own["doubts"]]
     Outcome(
@@ -69,7 +69,7 @@ def _read(case: Path, allow_dir: Path | None, as_json: bool) -> Gearbox:
         raise
 
 
-def _scripts(gearbox: Gearbox) -> Iterator[str]:
+def script_notes(gearbox: Gearbox) -> Iterator[str]:
     """Check the solids, and yield which of them require a script."""
     for key, model in solids_of(gearbox):
         if model.mesh.is_script:
@@ -84,7 +84,7 @@ def _scripts(gearbox: Gearbox) -> Iterator[str]:
 
 def summarise(gearbox: Gearbox) -> dict[str, Any]:
     """Summarise a gearbox, with units in the keys."""
-    pairs = [_pair_summary(gearbox, name) for name in gearbox.pairs]
+    pairs = [pair_summary(gearbox, name) for name in gearbox.pairs]
     loads = _load_summaries(gearbox)
     variants = {str(variant): lacking(gearbox, variant) for variant in OFFERED}
     assemblies = _assemblies(gearbox, variants)
@@ -94,7 +94,7 @@ def summarise(gearbox: Gearbox) -> dict[str, Any]:
         "name": gearbox.name,
         "ratio": gearbox.train.ratio,
         "pairs": pairs,
-        "tooth_thickness": _thickness_summaries(gearbox),
+        "tooth_thickness": thickness_summaries(gearbox),
         "forces": _force_summaries(gearbox),
         "bearings": bearings,
         "load_cases": loads,
@@ -136,7 +136,8 @@ def _damping_warnings(assemblies: Mapping[Variant, Assembly | FailedError]) -> l
     return list(filter(None, [unusual_damping(modes_of(assembly))]))
 
 
-def _pair_summary(gearbox: Gearbox, name: str) -> dict[str, Any]:
+def pair_summary(gearbox: Gearbox, name: str) -> dict[str, Any]:
+    """Summarise the geometry, load and margins of a gear pair."""
     spec = gearbox.pairs[name]
     pair = spec.pair
     margins = pair_margins(spec)
@@ -157,7 +158,7 @@ def _pair_summary(gearbox: Gearbox, name: str) -> dict[str, Any]:
     }
 
 
-def _thickness_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
+def thickness_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
     """Summarise the tooth thickness of gears with allowances."""
     summaries = []
     for name, section in gearbox.case.gears.items():

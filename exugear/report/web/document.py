@@ -53,7 +53,7 @@ def libraries() -> tuple[Library, ...]:
     Examples
     --------
     >>> [library.name for library in libraries()]
-    ['uplot', 'three']
+    ['uplot', 'three', 'codemirror']
     """
     listed = json.loads(vendored("vendor.json"))
     return tuple(
@@ -62,17 +62,19 @@ def libraries() -> tuple[Library, ...]:
     )
 
 
-def licences() -> str:
-    """Return the licences of all libraries as text for the pages."""
+def licences(names: Sequence[str] = ("uplot", "three")) -> str:
+    """Return the licences of libraries, by default those of the report, as text for the pages."""
     return "\n\n".join(
-        f"{library.name} {library.version}\n\n{vendored(library.licence_file)}" for library in libraries()
+        f"{library.name} {library.version}\n\n{vendored(library.licence_file)}"
+        for library in libraries()
+        if library.name in names
     )
 
 
 # Scripts of the pages: small modules, bundled in the order of their imports into one script without addresses
 
 _IMPORT = re.compile(r'^import (\{[^}]*\}) from "\./([a-z_]+)\.js";$', re.MULTILINE)
-_EXPORT = re.compile(r"^export ((?:async )?(?:function|const|class) (\w+))", re.MULTILINE)
+_EXPORT = re.compile(r"^export ((?:async )?(?:function\*?|const|class) (\w+))", re.MULTILINE)
 
 
 @cache
@@ -141,7 +143,9 @@ class ArrayStore:
     {'blob': 'a0', 'type': 'u8', 'shape': [3], 'differences': True}
     """
 
-    def __init__(self) -> None:
+    def __init__(self, prefix: str = "a", level: int = 9) -> None:
+        self._prefix = prefix
+        self._level = level
         self._packed: list[str] = []
         self._known: dict[bytes, str] = {}
 
@@ -158,9 +162,9 @@ class ArrayStore:
         if differences:
             kept = np.diff(array, axis=0, prepend=np.zeros_like(array[:1])).astype(array.dtype)
         little = kept.astype(kept.dtype.newbyteorder("<"), copy=False)
-        packed = zlib.compress(little.tobytes(), 9)
+        packed = zlib.compress(little.tobytes(), self._level)
         if packed not in self._known:  # equal planets share one array
-            self._known[packed] = f"a{len(self._packed)}"
+            self._known[packed] = f"{self._prefix}{len(self._packed)}"
             self._packed.append(base64.b64encode(packed).decode("ascii"))
         return {
             "blob": self._known[packed],
@@ -169,11 +173,14 @@ class ArrayStore:
             "differences": differences,
         }
 
+    def packed(self) -> dict[str, str]:
+        """Return all arrays as text by name."""
+        return dict(zip(self._known.values(), self._packed, strict=True))
+
     def elements(self) -> str:
         """Return all arrays as elements of the page."""
         return "\n".join(
-            f'<script type="text/plain" id="{name}">{data}</script>'
-            for name, data in zip(self._known.values(), self._packed, strict=True)
+            f'<script type="text/plain" id="{name}">{data}</script>' for name, data in self.packed().items()
         )
 
 
@@ -221,7 +228,15 @@ THEME = (
 
 
 def whole_page(
-    title: str, body: Markup, script: str, data: Mapping[str, Any], arrays: ArrayStore, libraries: Sequence[str]
+    title: str,
+    body: Markup,
+    script: str,
+    data: Mapping[str, Any],
+    arrays: ArrayStore,
+    libraries: Sequence[str],
+    *,
+    sheets: Sequence[str] = STYLES,
+    served_nonce: str = "",
 ) -> str:
     """Return the whole page.
 
@@ -232,6 +247,9 @@ def whole_page(
     data : JSON data for the scripts
     arrays : arrays that the data refer to
     libraries : required files of vendored libraries
+    sheets : style sheets, in their order
+    served_nonce : of a page from a server, which may send requests to that server alone, and whose scripts may add
+        style elements with this nonce; empty for a file
 
     Returns
     -------
@@ -240,11 +258,13 @@ def whole_page(
         files contain, and blocks all requests.
     """
     folder = files("exugear.report.web").joinpath("styles")
-    styles = [folder.joinpath(f"{name}.css").read_text(encoding="utf-8") for name in STYLES]
+    styles = [folder.joinpath(f"{name}.css").read_text(encoding="utf-8") for name in sheets]
     style = "\n".join([vendored("uPlot.min.css"), *styles])
     scripts = [*map(vendored, libraries), bundle(script)]
+    served = f" 'nonce-{served_nonce}'; connect-src 'self'" if served_nonce else ""
     policy = (
-        f"default-src 'none'; script-src {' '.join(map(_digest, [THEME, *scripts]))}; style-src {_digest(style)}; "
+        f"default-src 'none'; script-src {' '.join(map(_digest, [THEME, *scripts]))}; style-src {_digest(style)}"
+        f"{served}; "
         "img-src data: blob:; base-uri 'none'; form-action 'none'"
     )
     return render(

@@ -144,7 +144,7 @@ def _moving(
 
 def _reference(assembly: Assembly, body: DrawnBody) -> Floats:
     """Return the reference point of the owner's rigid-body motion: its centre of mass."""
-    own = next((one for one in assembly.gearbox.bodies(assembly.inertias) if one.name == body.owner), None)
+    own = next((one for one in assembly.bodies if one.name == body.owner), None)
     if own is None:
         return body.shape.reference
     return np.array([*own.axis, own.centre_of_mass_z])
@@ -183,7 +183,7 @@ def stage_data(
     arrays: ArrayStore,
     deformed: Collection[int],
 ) -> dict[str, Any]:
-    """Return the data of a model for the 3-D view.
+    """Return the data of a model for the 3-D view: its bodies and their motions.
 
     Parameters
     ----------
@@ -194,16 +194,34 @@ def stage_data(
     deformed : modes in which flexible bodies deform; in the others they move rigidly, which needs less memory
     """
     bodies = drawn_bodies(assembly)
+    return {**bodies_data(bodies, labels, arrays), **motions_data(assembly, bodies, shapes, arrays, deformed)}
+
+
+def bodies_data(bodies: tuple[DrawnBody, ...], labels: Mapping[str, str], arrays: ArrayStore) -> dict[str, Any]:
+    """Return the bodies of a 3-D view, and the size of the scene."""
     # A rotor with given inertias only has no shape to draw; the view is then empty.
     points = np.concatenate([np.zeros((0, 3)), *(body.shape.surface.points for body in bodies)])
     low, high = (points.min(axis=0), points.max(axis=0)) if bodies else (np.zeros(3), np.ones(3))
-    modes = [drawn_mode(assembly, bodies, shapes[:, n], n in deformed) for n in range(shapes.shape[1])]
-    fields = {place: n for n, place in enumerate(p for p, body in enumerate(bodies) if body.field is not None)}
     return {
         "bodies": _bodies(bodies, labels, arrays),
         "centre": rounded_list(0.5 * (low + high), 6),
         "diagonal": rounded(float(np.linalg.norm(high - low)), 6),
         "amplitude": LARGEST,
+        "colours": list(DISPLACEMENT_COLOURS),
+    }
+
+
+def motions_data(
+    assembly: Assembly,
+    bodies: tuple[DrawnBody, ...],
+    shapes: Floats | Complexes,
+    arrays: ArrayStore,
+    deformed: Collection[int] = (),
+) -> dict[str, Any]:
+    """Return the motions of the bodies of a 3-D view in mode shapes (size, modes)."""
+    modes = [drawn_mode(assembly, bodies, shapes[:, n], n in deformed) for n in range(shapes.shape[1])]
+    fields = {place: n for n, place in enumerate(p for p, body in enumerate(bodies) if body.field is not None)}
+    return {
         "motions": arrays.add(np.array([_parts(mode.motions) for mode in modes], dtype="f4")),
         "deformed": {
             str(n): {
@@ -213,7 +231,6 @@ def stage_data(
             for n in sorted(deformed)
             if fields
         },
-        "colours": list(DISPLACEMENT_COLOURS),
     }
 
 

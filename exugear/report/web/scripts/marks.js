@@ -26,6 +26,22 @@ export function drawMarks(stage) {
   drawAxes(drawing, stage, height);
   drawScale(drawing, stage, width, height);
   if (stage.labelled) drawNames(drawing, stage, width, height);
+  drawFlags(drawing, stage, width, height);
+}
+
+/** Rings around the points that are pointed out. @param {CanvasRenderingContext2D} drawing @param {import("./stage.js").Stage} stage @param {number} width @param {number} height */
+function drawFlags(drawing, stage, width, height) {
+  drawing.strokeStyle = drawing.fillStyle = pageColour("--bad");
+  drawing.lineWidth = 2.5;
+  drawing.textAlign = "center";
+  stage.flags.forEach(({ text, at }, number) => {
+    const seen = new THREE.Vector3(...at).project(stage.camera);
+    const [x, y] = [((seen.x + 1) / 2) * width, ((1 - seen.y) / 2) * height];
+    drawing.beginPath();
+    drawing.arc(x, y, 9, 0, 2 * Math.PI);
+    drawing.stroke();
+    if (number === 0) drawing.fillText(text, x, y - 18);
+  });
 }
 
 /** @param {CanvasRenderingContext2D} drawing @param {number[]} points x and y in turn */

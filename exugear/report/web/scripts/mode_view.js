@@ -9,6 +9,9 @@ import { state } from "./state.js";
 /** @type {Stage | null} */
 let stage = null;
 
+/** The stage, if this browser can draw it. */
+export const shownStage = () => stage;
+
 /** Begin: without WebGL the words stand alone. */
 export function beginModeView() {
   const canvas = /** @type {HTMLCanvasElement | null} */ (find("view-3d"));

@@ -8,13 +8,14 @@
 /** @typedef {{name: string, title: string, words: string, inertias: string, source: string, main: string, range: [number, number] | null, variants: Record<string, VariantData>}} GroupData */
 /** @typedef {{name: string, short: string, sentence: string, order: number, harmonic: number, family: string}} LineData */
 /** @typedef {{name: string, label: string, owner: string, fixed: boolean, elastic: boolean, colour: string, reference: number[], turn: number, low: number[], span: number[], points: ArrayReference, triangles: ArrayReference}} BodyData */
-/** @typedef {{bodies: BodyData[], centre: number[], diagonal: number, amplitude: number, motions: ArrayReference, deformed: Record<string, Record<string, ArrayReference>>, colours: string[]}} StageData */
+/** @typedef {{bodies: BodyData[], centre: number[], diagonal: number, amplitude: number, motions: ArrayReference, deformed: Record<string, Record<string, ArrayReference>>, colours: string[], geometry?: string}} StageData */
 /** @typedef {{title?: string, frequency: number, damping: number, words: string}} ModeData */
 /** @typedef {{words: string, variant: string, stage: StageData, modes: ModeData[]}} ModelData */
 /** @typedef {{label: string, style: string, right: boolean, x: ArrayReference, y: ArrayReference}} CurveData */
 /** @typedef {{title: string, axes: {label: string, logarithmic: boolean}[], curves: CurveData[], marks: {x: number, label: string}[]}} ChartData */
 /** @typedef {{label: string, unit: string, speeds: ArrayReference, values: ArrayReference}} SpeedCurve */
-/** @typedef {{name: string, input: string, rated: number | null, lines: LineData[], groups: GroupData[], models: Record<string, ModelData>, charts: Record<string, ChartData>, curves?: SpeedCurve[], first?: number}} PageData */
+/** @typedef {{table: string, name: string, about: string, meaning: string, example: string}} SchemaKey */
+/** @typedef {{name: string, input: string, rated: number | null, lines: LineData[], groups: GroupData[], models: Record<string, ModelData>, charts: Record<string, ChartData>, curves?: SpeedCurve[], first?: number, nonce?: string, schema?: SchemaKey[]}} PageData */
 
 /** @param {string} id @returns {string} */
 function textOf(id) {
@@ -36,6 +37,19 @@ const KINDS = {
   f32: Float32Array,
 };
 
+/** Arrays of the last pictures that came after the page, by name. @type {Record<string, string>[]} */
+const later = [];
+const KEPT_PICTURES = 4;
+
+/** @param {Record<string, string>} arrays by name */
+export function addArrays(arrays) {
+  later.push(arrays);
+  if (later.length > KEPT_PICTURES) for (const name of Object.keys(later.shift() ?? {})) unpacked.delete(name);
+}
+
+/** @param {string} name of an array that came after the page */
+const laterText = (name) => later.find((arrays) => name in arrays)?.[name];
+
 /** @type {Map<string, Promise<Numbers>>} */
 const unpacked = new Map();
 
@@ -54,7 +68,7 @@ export function unpack(reference) {
 
 /** @param {ArrayReference} reference @returns {Promise<Numbers>} */
 async function inflate(reference) {
-  const packed = Uint8Array.from(atob(textOf(reference.blob)), (letter) => letter.charCodeAt(0));
+  const packed = Uint8Array.from(atob(laterText(reference.blob) ?? textOf(reference.blob)), (letter) => letter.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
   const numbers = new KINDS[reference.type](await new Response(stream).arrayBuffer());
   if (reference.differences) {

@@ -10,6 +10,7 @@ const SLOW = 60;
 const FIRST_FRAMES = 4;
 
 /** @typedef {import("./actors.js").Actor} Actor */
+/** Name at a point, m. @typedef {{text: string, at: number[]}} Flag */
 
 export class Stage {
   /** @param {HTMLCanvasElement} canvas of the bodies @param {HTMLCanvasElement} marks over it: axes, scale, names */
@@ -34,6 +35,10 @@ export class Stage {
     this.hidden = new Set();
     this.amplitude = 1;
     this.byBody = false;
+    /** Bodies in a brighter colour. @type {Set<string>} */
+    this.marked = new Set();
+    /** @type {Flag[]} */
+    this.flags = [];
     this.playing = false;
     this.resting = false;
     this.angle = 0;
@@ -70,9 +75,11 @@ export class Stage {
     for (const [place, reference] of Object.entries(data.deformed[String(mode)] ?? {})) {
       fields[Number(place)] = /** @type {Int8Array} */ (await unpack(reference));
     }
-    const actors = data === this.data ? this.actors : await Promise.all(data.bodies.map((body) => actorOf(body)));
+    const same = data === this.data || (data.geometry !== undefined && data.geometry === this.data?.geometry);
+    const actors = same ? this.actors : await Promise.all(data.bodies.map((body) => actorOf(body)));
     if (mine !== this.asked) return;
-    if (data !== this.data) this.enter(data, actors);
+    if (!same) this.enter(data, actors);
+    this.data = data;
     Object.assign(this, { motions, fields, mode });
     this.colour();
     this.place(this.angle);
@@ -94,6 +101,7 @@ export class Stage {
     for (const actor of actors) this.scene.add(actor.mesh);
     this.ghosts = actors.filter((actor) => !actor.data.fixed).map(ghostOf);
     this.showRest(this.resting);
+    this.mark(this.marked, this.flags);
     if (first) this.lookFrom([0.75, 0.45, -1]);
     this.resize();
   }
@@ -103,6 +111,29 @@ export class Stage {
     this.resting = on;
     for (const ghost of this.ghosts) on ? this.scene.add(ghost) : this.scene.remove(ghost);
     this.draw();
+  }
+
+  /** Point out bodies and points. @param {Set<string>} marked names of bodies @param {Flag[]} flags */
+  mark(marked, flags) {
+    Object.assign(this, { marked, flags });
+    for (const { data, mesh } of this.actors) mesh.material.emissive.set(marked.has(data.owner) ? 0x2a5f96 : 0x000000);
+    this.draw();
+  }
+
+  /**
+   * Body and point (m) under a place of the window; fixed bodies, which are translucent, come last.
+   * @param {number} x @param {number} y @returns {{owner: string, point: number[]} | null}
+   */
+  pick(x, y) {
+    const box = this.canvas.getBoundingClientRect();
+    const caster = new THREE.Raycaster();
+    const place = new THREE.Vector2((2 * (x - box.left)) / box.width - 1, 1 - (2 * (y - box.top)) / box.height);
+    caster.setFromCamera(place, this.camera);
+    const seen = this.actors.filter(({ mesh }) => mesh.visible);
+    const hits = caster.intersectObjects(seen.map(({ mesh }) => mesh), false);
+    const owned = hits.map((hit) => ({ hit, data: seen[seen.findIndex(({ mesh }) => mesh === hit.object)].data }));
+    const first = owned.find(({ data }) => !data.fixed) ?? owned[0];
+    return first ? { owner: first.data.owner, point: first.hit.point.toArray() } : null;
   }
 
   /** @param {number[]} direction from the middle to the eye */

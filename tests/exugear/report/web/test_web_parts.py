@@ -28,6 +28,8 @@ from exugear.report.web.document import (
 ROOT = Path(__file__).parents[4]
 SCRIPTS = sorted(path.stem for path in (ROOT / "exugear" / "report" / "web" / "scripts").glob("*.js"))
 
+VENDORED = ("uPlot.iife.min.js", "three.min.js", "codemirror.min.js")
+
 
 def test_vendored_files_are_those_that_were_taken():
     listed = {name: digest for library in libraries() for name, digest in library.files}
@@ -40,7 +42,7 @@ def test_vendored_files_are_those_that_were_taken():
 def test_vendored_versions_are_those_that_npm_is_pinned_to():
     pinned = json.loads((ROOT / "web" / "package.json").read_text(encoding="utf-8"))["devDependencies"]
     assert {library.name: library.version for library in libraries()} == {
-        name: pinned[name] for name in ("uplot", "three")
+        name: pinned[name] for name in ("uplot", "three", "codemirror")
     }
     assert all(re.fullmatch(r"[\d.]+", version) for version in pinned.values())
 
@@ -49,15 +51,15 @@ def test_every_library_comes_with_its_licence():
     for library in libraries():
         assert library.licence == "MIT"
         assert "Permission is hereby granted" in vendored(library.licence_file)
-        assert f"{library.name} {library.version}" in licences()
+        assert f"{library.name} {library.version}" in licences([library.name])
 
 
-@pytest.mark.parametrize("text", [vendored("uPlot.iife.min.js"), vendored("three.min.js"), bundle("report")])
+@pytest.mark.parametrize("text", [vendored(name) for name in VENDORED] + [bundle("report"), bundle("edit")])
 def test_no_script_ends_its_element_or_hides_what_follows(text):
     assert not re.search(r"</script|<!--|\r|\x00", text, re.IGNORECASE)
 
 
-@pytest.mark.parametrize("main", ["report", "mode_page"])
+@pytest.mark.parametrize("main", ["report", "mode_page", "edit"])
 def test_a_bundle_leaves_no_import_and_no_export(main):
     whole = bundle(main)
     assert not re.search(r"^\s*(import|export)\b", whole, re.MULTILINE)
@@ -66,7 +68,7 @@ def test_a_bundle_leaves_no_import_and_no_export(main):
 
 
 def test_every_script_is_part_of_a_page():
-    assert {*module_order("report"), *module_order("mode_page")} == set(SCRIPTS)
+    assert {*module_order("report"), *module_order("mode_page"), *module_order("edit")} == set(SCRIPTS)
 
 
 @pytest.mark.parametrize("name", SCRIPTS)

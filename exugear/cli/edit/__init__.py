@@ -1,0 +1,1 @@
+"""The command `edit`: a gearbox file in a page, with all that is computed from it while it is typed."""

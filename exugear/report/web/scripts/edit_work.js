@@ -1,0 +1,78 @@
+// Long computations of the page `edit`: buttons, progress, time left, cancelling; and the file that others may change.
+import { make, need, say } from "./dom.js";
+import { ask } from "./edit_server.js";
+
+/** @typedef {{kind: string, name: string, state: string, digest: string, seconds: number, progress: {words?: string, done?: number, total?: number | null, left?: number | null}, lines: string[]}} Told */
+/** @typedef {{digest: string, missing: boolean, report: string}} FileState */
+
+const PERIOD = 1000;
+const REPORT_STATES = /** @type {Record<string, string>} */ ({ current: "Open report", old: "Open report of an earlier state" });
+
+/**
+ * @param {() => boolean} isSaved
+ * @param {(file: FileState) => void} noticeFile
+ */
+export function beginWork(isSaved, noticeFile) {
+  for (const button of document.querySelectorAll("button[data-work]")) {
+    button.addEventListener("click", () => void start(/** @type {HTMLElement} */ (button).dataset.work ?? "", isSaved));
+  }
+  need("cancel").addEventListener("click", () => void ask("cancel", {}));
+  const poll = async () => {
+    try {
+      const response = await ask("poll");
+      if (!response.ok) throw new Error();
+      const { file, work } = await response.json();
+      noticeFile(file);
+      showWork(work, isSaved() ? file.digest : "");
+      showReport(isSaved() ? file.report : file.report === "current" ? "old" : file.report);
+      need("ended").hidden = true;
+    } catch {
+      need("ended").hidden = false;
+    }
+    setTimeout(poll, PERIOD);
+  };
+  void poll();
+}
+
+/** @param {string} kind @param {() => boolean} isSaved */
+async function start(kind, isSaved) {
+  if (!isSaved()) return say("Save the file first: long computations read the saved file.");
+  const response = await ask("start", { kind });
+  const content = await response.json();
+  if (response.ok) showWork(content.work, content.work.digest);
+  else say(content.error);
+}
+
+/** @param {Told | null} work @param {string} digest of the text, if it is saved */
+function showWork(work, digest) {
+  need("work").hidden = !work;
+  if (!work) return;
+  const running = work.state === "running";
+  const earlier = !running && work.digest !== digest;
+  need("work").classList.toggle("old", earlier);
+  const { words = "", done = 0, total = null, left = null } = work.progress;
+  const told = running ? [words, timeText(work.seconds), left === null ? "" : `${timeText(left)} left`] : [`${work.state} after ${timeText(work.seconds)}`];
+  need("work-words").textContent = `${work.name}: ${told.filter(Boolean).join(", ")}${earlier ? "; for an earlier state of the file" : ""}`;
+  const bar = /** @type {HTMLProgressElement} */ (need("progress"));
+  bar.hidden = !running;
+  if (total) Object.assign(bar, { max: total, value: done });
+  else bar.removeAttribute("value");
+  need("cancel").hidden = !running;
+  need("work-lines").textContent = work.lines.join("\n");
+  need("work-output").hidden = !work.lines.length;
+}
+
+/** @param {string} state */
+function showReport(state) {
+  const place = need("report");
+  if (place.dataset.state === state) return;
+  place.dataset.state = state;
+  place.replaceChildren();
+  if (REPORT_STATES[state]) place.append(make("a", { href: "report.html", target: "_blank", class: state }, REPORT_STATES[state]));
+}
+
+/** @param {number} seconds */
+function timeText(seconds) {
+  const whole = Math.round(seconds);
+  return whole < 60 ? `${whole} s` : `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")} min`;
+}
