@@ -76,8 +76,8 @@ def damping_band(model: HarmonicBalanceModel, method: Method, speed: Floats, amp
     found = np.zeros((len(point), len(quantities), 2))
     respond = {"linear": linear_response, "parametric": parametric_response}[method]
     damped = [model.with_system(system) for system in damping_limits(model.system)]
-    about = ABOUT_WITH_RING if model.waves.neighbours else ABOUT
-    solves = list(product(range(len(damped)), np.unique(point), about))
+    beside = ABOUT_WITH_RING if model.waves.neighbours else ABOUT
+    solves = list(product(range(len(damped)), np.unique(point), beside))
 
     def sizes_at(solve: tuple[int, int, float]) -> Floats:
         """Sizes (lines, s) of the quantities in one solution."""
