@@ -230,7 +230,7 @@ def mean_system(assembly: Assembly, speeds: Floats) -> MeanSystem:
         pinned,
         spread,
         variation,
-        held if sets else None,
+        held if frame.has_elastic_ring else None,
     )
 
 
