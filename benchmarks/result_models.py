@@ -179,6 +179,7 @@ def steady_section(part: Results) -> str:
             "Damping and friction over damping times alone, variant bushing:\n",
             table(["dissipation", "response, parametric", "run-up"], dissipation),
             *(by_excitations if excitations else ()),
+            *([whole_flexible(part["whole"])] if "whole" in part else ()),
             items(
                 [
                     "Limited by: half of a speed is the compliance of each line, a dense solution of the mean "
@@ -186,6 +187,15 @@ def steady_section(part: Results) -> str:
                 ]
             ),
         ]
+    )
+
+
+def whole_flexible(row: Results) -> str:
+    """Return the cost of the response with all bodies flexible as a sentence."""
+    return (
+        f"All bodies flexible ({row['coordinates']} coordinates), parametric: averaged system "
+        f"{duration(row['prepared_s'])}; choice of {row['lines']} of {row['lines_at_most']} orders that the flexible "
+        f"ring gear couples {duration(row['chosen_s'])}; a speed {duration(row['speed_s'])}.\n"
     )
 
 

@@ -11,11 +11,15 @@ from typing import Any
 
 import numpy as np
 from dynamics import stiffness_of
-from elastic import SHAFTS, with_elastic
+from elastic import SHAFTS, assembled, with_elastic
 from timing import CASE, say, timed
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.steady.excitation import HarmonicBalanceModel
+from exugear.steady.neighbours import judged_speeds, with_needed_neighbours
+from exugear.steady.point_solver import PointSolver, harmonic_balance_model
+from exugear.steady.response import signals
 from exugear.steady.settings import METHODS, SpeedRange, SteadySettings
 from exugear.steady.steady_response import response_of
 from exugear.system.bodies.elastic_body import ElasticBody
@@ -34,6 +38,8 @@ DISSIPATION = {
 """Keys of the section on damping by what they add."""
 EXCITATIONS = (0, 1, 3, 10)
 """Numbers of stated excitations."""
+AT_SPEEDS = 8
+"""Speeds at which the gearbox with all bodies flexible is solved."""
 LINES = ((10, 3), (10, 5), (16, 4), (20, 3))
 """Harmonics, and largest sum of multiples of combinations."""
 
@@ -82,6 +88,29 @@ def excitations_of(gearbox: Gearbox, speeds: SpeedRange) -> list[dict[str, Any]]
             settings = SteadySettings(speeds, method, at_resonances=False)
             rows.append({"excitations": count, **cost_of(assembly, settings)})
     return rows
+
+
+def whole_of(gearbox: Gearbox, speeds: SpeedRange) -> dict[str, Any]:
+    """Processor time of the response of the gearbox with all its bodies flexible, at a few speeds.
+
+    The averaged system comes first, then the choice of the orders that the flexible ring gear couples.
+    """
+    assembly = assembled(gearbox, "flexible")
+    at = np.linspace(0.4, 1.0, AT_SPEEDS) * speeds.values[-1]
+    models: list[HarmonicBalanceModel] = []
+    prepared = timed(lambda: models.append(harmonic_balance_model(assembly, at)))
+    chosen = timed(lambda: models.append(with_needed_neighbours(models[0], judged_speeds(at[0], at[-1], ()))[0]))
+    solver = PointSolver(models[1], "parametric")
+    solver.response(float(at[0]))  # loads the compiled code
+    solved = timed(lambda: [signals(solver.model, solver.response(float(speed))) for speed in at])
+    return {
+        "coordinates": assembly.size,
+        "lines_at_most": len(models[0].lines.orders),
+        "lines": len(models[1].lines.orders),
+        "prepared_s": prepared.processor,
+        "chosen_s": chosen.processor,
+        "speed_s": solved.processor / len(at),
+    }
 
 
 def run_up_of(
@@ -136,4 +165,5 @@ def measure(quick: bool) -> dict[str, Any]:
         "dissipation": dissipation,
         "excitations": excitations_of(gearbox, speeds),
         "coordinates": coordinates,
+        "whole": whole_of(gearbox, speeds),
     }
