@@ -24,6 +24,7 @@ from exugear.steady.settings import Method
 from exugear.system.kernels.modal_damping import modal_matrix
 from exugear.system.modal_damping import with_modal_damping
 from fe_ste.tools.arrays import Booleans, Floats, Integers, SingleComplexes
+from fe_ste.tools.threads import side_by_side
 
 FACTORS = (0.5, 2.0)
 """Factors on the damping where the file states no range."""
@@ -86,7 +87,8 @@ def damping_band(model: HarmonicBalanceModel, method: Method, speed: Floats, amp
         own_signals = 2.0 * signals(damped[end], response)[line[point == at]]
         return np.stack([quantity.sizes(own_signals).max(axis=1) for quantity in quantities], axis=1)
 
-    for (end, at, about), sizes in zip(solves, map(sizes_at, solves), strict=True):
+    sizes_of_all = side_by_side(sizes_at, solves) if model.waves.neighbours else map(sizes_at, solves)
+    for (end, at, about), sizes in zip(solves, sizes_of_all, strict=True):
         here = point == at
         # A quantity without a peak there counts at the peak's speed: beside it others may rise.
         counts = rises[here] | (about == 0.0)

@@ -8,6 +8,7 @@ a few speeds with many neighbours show which of them are needed.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from exugear.steady.crossings import Crossing
 from exugear.steady.excitation import HarmonicBalanceModel
 from exugear.steady.response import parametric_response
 from fe_ste.tools.arrays import Complexes, Floats
+from fe_ste.tools.threads import side_by_side
 
 CARRIED = (1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
 """Shares of the deflections of all meshes that a line has to have at one of the speeds, tried one after the other.
@@ -44,17 +46,15 @@ def with_needed_neighbours(model: HarmonicBalanceModel, speeds: Floats) -> tuple
     meshes = len(model.waves.base_orders)
     index = model.lines.index
     beside = index[:, meshes:].any(axis=1) & index[:, :meshes].any(axis=1)
-    whole = [_vibration(model, speed) for speed in map(float, speeds)]
+    whole = side_by_side(lambda speed: _vibration(model, float(speed)), speeds)
     shares = np.array([np.linalg.norm(values[:, 1:], axis=1) for values in whole])
     shares /= np.linalg.norm(shares[:, 1:], axis=1)[:, None]
     few, changed = model, 0.0
     for carried in CARRIED:
         kept = ~beside | (shares.max(axis=0) > carried)
         few = model.of(kept)
-        changed = max(
-            _change(_vibration(few, speed), values[kept])
-            for speed, values in zip(map(float, speeds), whole, strict=True)
-        )
+        chosen = side_by_side(partial(_vibration, few), map(float, speeds))
+        changed = max(_change(found, values[kept]) for found, values in zip(chosen, whole, strict=True))
         if changed < CHANGED:
             break
     return few, changed

@@ -41,7 +41,7 @@ from exugear.steady.settings import SteadySettings, check_deviations, check_law,
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers, SingleComplexes, Texts
 from fe_ste.tools.display import ReprMixin, TitledRows, value_range
-from fe_ste.tools.threads import one_dense_thread
+from fe_ste.tools.threads import one_dense_thread, side_by_side
 
 LONGEST = 0.4
 """Longest step along a branch: in tenths of the static deflections, and in hundredths of the speed."""
@@ -277,6 +277,8 @@ SLOWEST_BRANCH = 0.01
 """Share of the fastest speed at which a branch from standstill begins."""
 LONGEST_WARNING = 300
 """Letters of a remark."""
+AT_ONCE = 2
+"""Speeds that are solved at the same time with a flexible ring gear: nearly all of their time is compiled code."""
 RESOLVED = 1e-4
 """Share of the exchanged power below which dissipated power is round-off."""
 Kept = Callable[[SolvedPoints], None]
@@ -438,9 +440,11 @@ def _solve_from(
     kept = time.monotonic()
     done = count
     try:
-        for n in range(count, len(points.speed)):
-            _solve_one(points, n, solver())
-            done = n + 1
+        at_once = AT_ONCE if solver().model.waves.neighbours else 1
+        for n in range(count, len(points.speed), at_once):
+            beyond = min(n + at_once, len(points.speed))
+            side_by_side(lambda at: _solve_one(points, at, solver()), range(n, beyond))
+            done = beyond
             progress(done, len(points.speed))
             if keep is not None and time.monotonic() - kept > keep_every:
                 keep(points.part(slice(done)))
