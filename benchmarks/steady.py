@@ -16,10 +16,10 @@ from timing import CASE, say, timed
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.steady.excitation import HarmonicBalanceModel
-from exugear.steady.neighbours import judged_speeds, with_needed_neighbours
+from exugear.steady.balance.excitation import HarmonicBalanceModel
+from exugear.steady.balance.neighbours import judged_speeds, with_needed_neighbours
+from exugear.steady.balance.response import signals
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
-from exugear.steady.response import signals
 from exugear.steady.settings import METHODS, SpeedRange, SteadySettings
 from exugear.steady.steady_response import response_of
 from exugear.system.bodies.elastic_body import ElasticBody

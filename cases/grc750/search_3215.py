@@ -33,10 +33,10 @@ import scipy.linalg
 from published import published_project
 
 from exugear import Choice, Gearbox, Project, assemble
-from exugear.steady.excitation import HarmonicBalanceModel
+from exugear.steady.balance.excitation import HarmonicBalanceModel
+from exugear.steady.balance.response import transmission_errors
 from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.steady.point_solver import harmonic_balance_model
-from exugear.steady.response import transmission_errors
 from exugear.system.system import input_hash
 from exugear.system.tooth_mesh.contact_state import MeshContactState
 from exugear.system.tooth_mesh.element import MeshCurve

@@ -3,20 +3,23 @@
 **Averaged system** (`mean_system.rotating_frame`, `mean_system.mean_system`): in multi-blade coordinates u, the gearbox
 has constant matrices, M u'' + C(W) u' + K(W) u = forces, at the speed W of the input.
 
-**Unknowns** (`mean_system.mesh_places`, `excitation.Interface`): for every order k with the angular frequency w_k, the
-inputs y_k of the mesh models: deflection, and where the model needs them centre distance, misalignment and position in
-the mesh cycle. The orders are the integer combinations of the mesh frequencies (`harmonics.lines`).
+**Unknowns** (`mean_system.mesh_places`, `balance.excitation.Interface`): for every order k with the angular frequency
+w_k, the inputs y_k of the mesh models: deflection, and where the model needs them centre distance, misalignment and
+position in the mesh cycle. The orders are the integer combinations of the mesh frequencies (`harmonics.lines`).
 
-**Equation** (`response`): meshes act with forces F in addition to those of their mean stiffness, which is in K. With
-the compliance G(w_k) of the averaged system at the interface (`excitation.HarmonicBalanceModel.at`),
+**Equation** (`balance.response`): meshes act with forces F in addition to those of their mean stiffness, which is in K.
+With the compliance G(w_k) of the averaged system at the interface (`balance.excitation.HarmonicBalanceModel.at`),
 
     y_k = y_static [k = 0] - G(w_k) F_k(y).
 
-**Methods**, by what F is:
+**Methods** (`balance`), by what F is:
 
 - `linear` (`response.linear_response`): the static transmission error under the mean force; F does not depend on y.
 - `parametric` (`response.parametric_response`): the tangent stiffness over the mesh cycle; F is linear in y.
 - `nonlinear` (`nonlinear.HarmonicResidual`): the models of teeth and bearings, sampled in time.
+
+A flexible ring gear couples orders beside each other (`balance.passing_planets`), of which those that matter are kept
+(`balance.neighbours`).
 
 **Solution** (`point_solver.PointSolver`): directly, by GMRES, or by Newton's method, at one speed. `steady_response`
 chooses the speeds, `damping_band` solves the highest peaks for other damping, and `steady_file` keeps the result.

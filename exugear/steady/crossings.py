@@ -18,13 +18,13 @@ from functools import partial
 import numpy as np
 import scipy.linalg
 
+from exugear.steady.balance.excitation import HarmonicBalanceModel, Interface
+from exugear.steady.balance.response import mean_deviation_forces, transmission_errors
 from exugear.steady.campbell import ModeTracks
-from exugear.steady.excitation import HarmonicBalanceModel, Interface
 from exugear.steady.harmonics.branches import NEIGHBOURS, predicted_top, standing_peaks
 from exugear.steady.mean_system.mean_system import MeanSystem, mean_modes
 from exugear.steady.mean_system.mesh_places import DEFLECTION
 from exugear.steady.mean_system.signals import Quantity
-from exugear.steady.response import mean_deviation_forces, transmission_errors
 from exugear.system.statics import linearise
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, SingleComplexes
 from fe_ste.tools.threads import side_by_side

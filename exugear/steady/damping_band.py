@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from exugear.gearbox.load_cases import operating_range
-from exugear.steady.excitation import HarmonicBalanceModel
+from exugear.steady.balance.excitation import HarmonicBalanceModel
+from exugear.steady.balance.response import linear_response, parametric_response, signals
 from exugear.steady.harmonics.branches import standing_peaks
 from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.steady.mean_system.signals import Quantity
-from exugear.steady.response import linear_response, parametric_response, signals
 from exugear.steady.settings import Method
 from exugear.system.kernels.modal_damping import modal_matrix
 from exugear.system.modal_damping import with_modal_damping

@@ -14,14 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from exugear.steady.excitation import HarmonicBalanceModel, Interface
-from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
-from exugear.steady.harmonics.lines import LineSet, TorusSampling, joined, largest
-from exugear.steady.mean_system.mean_system import mean_system
-from exugear.steady.mean_system.mesh_places import DEFLECTION
-from exugear.steady.mean_system.mesh_waves import FEWEST, mesh_waves
-from exugear.steady.mean_system.shaft_orders import shaft_orders, without_deviations
-from exugear.steady.nonlinear import (
+from exugear.steady.balance.excitation import HarmonicBalanceModel, Interface
+from exugear.steady.balance.nonlinear import (
     CHECKED,
     HarmonicResidual,
     candidates,
@@ -32,7 +26,7 @@ from exugear.steady.nonlinear import (
     response_of_readings,
     solve_balance,
 )
-from exugear.steady.response import (
+from exugear.steady.balance.response import (
     Response,
     linear_response,
     mean_deviation_forces,
@@ -40,6 +34,12 @@ from exugear.steady.response import (
     signals,
     transmission_errors,
 )
+from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
+from exugear.steady.harmonics.lines import LineSet, TorusSampling, joined, largest
+from exugear.steady.mean_system.mean_system import mean_system
+from exugear.steady.mean_system.mesh_places import DEFLECTION
+from exugear.steady.mean_system.mesh_waves import FEWEST, mesh_waves
+from exugear.steady.mean_system.shaft_orders import shaft_orders, without_deviations
 from exugear.steady.settings import Method
 from exugear.steady.settling import SettlingRun, SettlingSegment, cannot_settle
 from exugear.system.system import Assembly

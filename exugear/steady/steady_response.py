@@ -13,6 +13,10 @@ import numpy as np
 from exugear.gearbox.load_cases import operating_range
 from exugear.gearbox.units import RPM
 from exugear.results.sound.radiated_power import RadiatedPower
+from exugear.steady.balance.excitation import HarmonicBalanceModel
+from exugear.steady.balance.neighbours import judged_speeds, with_needed_neighbours
+from exugear.steady.balance.nonlinear import HarmonicResidual, Tangent, growth_of_state
+from exugear.steady.balance.response import Response, dissipated_and_given, exchanged_power, signals
 from exugear.steady.campbell import Campbell, ModeTracks, campbell_of, modes_over_speed
 from exugear.steady.crossings import (
     HARMONICS,
@@ -26,17 +30,13 @@ from exugear.steady.crossings import (
     with_crossings,
 )
 from exugear.steady.damping_band import DampingBand, damping_band, no_band
-from exugear.steady.excitation import HarmonicBalanceModel
 from exugear.steady.harmonics.branches import Scales, standing_peaks, trace
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
 from exugear.steady.harmonics.lines import LineSet
 from exugear.steady.mean_system.mesh_places import DEFLECTION
 from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.mean_system.signals import SignalName
-from exugear.steady.neighbours import judged_speeds, with_needed_neighbours
-from exugear.steady.nonlinear import HarmonicResidual, Tangent, growth_of_state
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
-from exugear.steady.response import Response, dissipated_and_given, exchanged_power, signals
 from exugear.steady.settings import SteadySettings, check_deviations, check_law, check_ring, check_speeds
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers, SingleComplexes, Texts
@@ -320,7 +320,7 @@ def response_of(
     neglected = 0.0
     if model.waves.neighbours:
         every = model.lines.index
-        judged = judged_speeds(float(even.min()), float(even.max()), found)
+        judged = judged_speeds(float(even.min()), float(even.max()), [one.speed for one in found])
         model, neglected = with_needed_neighbours(model, judged)
         solver = PointSolver(model, settings.method)
         found = tuple(replace(one, line=int(model.lines.find(every[one.line])[0])) for one in found)

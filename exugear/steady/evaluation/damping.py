@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from exugear.steady.balance.response import signals
 from exugear.steady.damping_band import damping_limits
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
-from exugear.steady.response import signals
 from exugear.steady.settings import SteadySettings
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import SingleComplexes

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from exugear.steady.balance.response import signals
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
-from exugear.steady.response import signals
 from exugear.steady.steady_file import settings_of
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Complexes

@@ -9,11 +9,11 @@ import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.sections.entries import quantities
+from exugear.steady.balance.response import signals
 from exugear.steady.evaluation.comparison import ComparedCuts, harmonic_rows, transfers_of
 from exugear.steady.evaluation.fit import MOST_PARAMETERS
 from exugear.steady.evaluation.swept import swept_cut
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
-from exugear.steady.response import signals
 from exugear.steady.settings import SteadySettings
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Floats

@@ -52,8 +52,8 @@ many harmonics."""
 NEIGHBOURS = 6
 """Multiples of the planet passing frequency by which a flexible ring gear couples each order to others, at most.
 
-Those that carry hardly any vibration are left out later (`exugear.steady.neighbours`). With four, main orders of the
-GRC are within 1e-3 of those with twelve at most speeds, with six within 2e-4."""
+Those that carry hardly any vibration are left out later (`exugear.steady.balance.neighbours`). With four, main orders
+of the GRC are within 1e-3 of those with twelve at most speeds, with six within 2e-4."""
 CONSTANT = 1e-9
 """Variation of a compliance over its mean below which there is none."""
 SAME_BASE = 1e-9

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
+from exugear.steady.balance.response import signals
 from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
-from exugear.steady.response import signals
 from exugear.system.loads import LoadTable
 from exugear.system.modes import overall_row
 from exugear.transient.compiled.solver import CompiledSystem

@@ -16,7 +16,7 @@ from exugear.gearbox.templates.kinds import template
 
 from .page_view import IN_BROWSER, SIZES
 
-pytestmark = IN_BROWSER
+pytestmark = [*IN_BROWSER, pytest.mark.usefixtures("terminal_signals")]
 WAIT = 120_000
 """Longest wait, ms: compiled kernels may have to be compiled first."""
 

@@ -13,11 +13,11 @@ import pytest
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.steady import steady_response
+from exugear.steady.balance.response import signals
 from exugear.steady.harmonics.branches import trace
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
 from exugear.steady.mean_system.mesh_places import DEFLECTION
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
-from exugear.steady.response import signals
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.settling import SettlingRun
 from exugear.steady.steady_response import follow_branch, response_of

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from exugear.gearbox.choice import Choice
+from exugear.steady.balance.response import linear_response, signals, transmission_errors
 from exugear.steady.campbell import modes_over_speed
 from exugear.steady.crossings import contributions, crossings, loudest_near
 from exugear.steady.point_solver import harmonic_balance_model
-from exugear.steady.response import linear_response, signals, transmission_errors
 from exugear.system.build import assemble
 
 RANGE = np.array([1.0, 22.5])

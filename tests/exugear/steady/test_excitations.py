@@ -10,10 +10,10 @@ import pytest
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
+from exugear.steady.balance.response import signals
 from exugear.steady.crossings import contributions
 from exugear.steady.findings import response_findings
 from exugear.steady.mean_system.planet_sets import SteadyError
-from exugear.steady.response import signals
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import to_dataset, with_names
 from exugear.steady.steady_response import response_of

@@ -9,12 +9,12 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.steady.balance.neighbours import with_needed_neighbours
+from exugear.steady.balance.response import dissipated_and_given, parametric_response, signals
 from exugear.steady.mean_system.mean_system import mean_system, rotating_frame, unsuitable
 from exugear.steady.mean_system.mesh_waves import mesh_waves
 from exugear.steady.mean_system.planet_sets import SteadyError, planet_sets
 from exugear.steady.mean_system.symmetric_carriers import symmetric_carrier
-from exugear.steady.neighbours import with_needed_neighbours
-from exugear.steady.response import dissipated_and_given, parametric_response, signals
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.settling import frame_coordinates
 from exugear.steady.steady_response import response_of

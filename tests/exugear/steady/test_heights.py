@@ -10,11 +10,11 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.templates.kinds import template
 from exugear.gearbox.units import RPM
+from exugear.steady.balance.response import signals
 from exugear.steady.harmonics.branches import standing_peaks
 from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.mean_system.signals import quantities_of
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
-from exugear.steady.response import signals
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_response import response_of
 from exugear.system.build import assemble

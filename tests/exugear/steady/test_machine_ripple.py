@@ -15,8 +15,8 @@ from exugear.cli.app import app
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
-from exugear.steady.mean_system.rotating_frame import SteadyError
-from exugear.steady.response import signals
+from exugear.steady.balance.response import signals
+from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_response import response_of
 from exugear.system.build import assemble

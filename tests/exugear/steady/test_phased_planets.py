@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from exugear.gearbox.choice import Choice
+from exugear.steady.balance.nonlinear import HarmonicResidual, solve_balance
+from exugear.steady.balance.response import dissipated_and_given, signals, transmission_errors
 from exugear.steady.mean_system.mesh_places import POSITION, mesh_places
 from exugear.steady.mean_system.planet_sets import SteadyError
-from exugear.steady.nonlinear import HarmonicResidual, solve_balance
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
-from exugear.steady.response import dissipated_and_given, signals, transmission_errors
 from exugear.steady.steady_response import follow_branch
 from exugear.system.build import assemble
 

@@ -9,7 +9,7 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.project import Project
-from exugear.steady.response import signals
+from exugear.steady.balance.response import signals
 from exugear.system.build import assemble
 
 from ..conftest import CASE

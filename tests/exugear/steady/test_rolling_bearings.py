@@ -9,9 +9,9 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.steady.balance.nonlinear import HarmonicResidual
+from exugear.steady.balance.response import dissipated_and_given, signals
 from exugear.steady.mean_system.planet_sets import SteadyError
-from exugear.steady.nonlinear import HarmonicResidual
-from exugear.steady.response import dissipated_and_given, signals
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import stored_or_computed
 from exugear.steady.steady_response import follow_branch

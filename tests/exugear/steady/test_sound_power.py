@@ -16,9 +16,9 @@ from exugear.report.findings.ranking import ranking_of
 from exugear.results.sound.levels import a_weighting, power_level
 from exugear.results.sound.over_speed import sound_over_speed
 from exugear.results.sound.radiated_power import AIR_IMPEDANCE, radiated_power
+from exugear.steady.balance.response import signals
 from exugear.steady.findings import UPPER_ESTIMATE, response_findings
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
-from exugear.steady.response import signals
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import load_response, stored_or_computed
 from exugear.studies.quantities import QUANTITIES

@@ -9,9 +9,9 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.steady.balance.nonlinear import HarmonicResidual
+from exugear.steady.balance.response import dissipated_and_given, signals
 from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, POSITION
-from exugear.steady.nonlinear import HarmonicResidual
-from exugear.steady.response import dissipated_and_given, signals
 from exugear.system.build import assemble
 from exugear.system.tooth_mesh.element import MeshCurve
 

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from exugear.gearbox.choice import Choice
-from exugear.steady.campbell import modes_over_speed
-from exugear.steady.crossings import Mode, crossings, improved, with_crossings
-from exugear.steady.point_solver import harmonic_balance_model
-from exugear.steady.response import (
+from exugear.steady.balance.response import (
     dissipated_and_given,
     linear_response,
     parametric_response,
     signals,
     transmission_errors,
 )
+from exugear.steady.campbell import modes_over_speed
+from exugear.steady.crossings import Mode, crossings, improved, with_crossings
+from exugear.steady.point_solver import harmonic_balance_model
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_response import response_of
 from exugear.system.build import assemble

@@ -11,8 +11,8 @@ import pytest
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
+from exugear.steady.balance.response import signals
 from exugear.steady.point_solver import PointSolver
-from exugear.steady.response import signals
 from exugear.system.build import assemble
 from exugear.system.loads import LoadTable
 from exugear.system.system import Assembly

@@ -12,8 +12,8 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import friction_warning, summarise_loads
 from exugear.gearbox.reading import GearboxFileError
 from exugear.results.run_file import read_run
+from exugear.steady.balance.response import signals
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
-from exugear.steady.response import signals
 from exugear.system.build import assemble
 from exugear.system.loads import LoadTable
 from exugear.system.signals import BALANCE_TERMS, energy_residual

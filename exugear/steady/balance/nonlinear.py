@@ -17,7 +17,8 @@ from functools import cached_property
 
 import numpy as np
 
-from exugear.steady.excitation import HarmonicBalanceModel, Interface
+from exugear.steady.balance.excitation import HarmonicBalanceModel, Interface
+from exugear.steady.balance.response import Response, rates_of
 from exugear.steady.harmonics.branches import exponents, kicks_needed
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError, solve_lines
 from exugear.steady.harmonics.lines import TorusSampling
@@ -34,7 +35,6 @@ from exugear.steady.mean_system.sampled_laws import (
     sample_wandering_line,
     widened,
 )
-from exugear.steady.response import Response, rates_of
 from exugear.system.modes import fastest_growth, state_matrix
 from fe_ste.tools.arrays import Complexes, Floats, Integers
 

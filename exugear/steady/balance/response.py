@@ -20,11 +20,11 @@ from functools import cached_property
 
 import numpy as np
 
-from exugear.steady.excitation import HarmonicBalanceModel, Interface
+from exugear.steady.balance.excitation import HarmonicBalanceModel, Interface
+from exugear.steady.balance.passing_planets import PassingPlanets
 from exugear.steady.harmonics.linear_solvers import solve_lines
 from exugear.steady.harmonics.lines import add_answered, flat
 from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, POSITION, MeshInterface, Spectra
-from exugear.steady.passing_planets import PassingPlanets
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.bundles import cached_bundle
 from fe_ste.tools.octets import SIZE

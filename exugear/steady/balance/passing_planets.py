@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from exugear.steady.excitation import HarmonicBalanceModel, Interface
+from exugear.steady.balance.excitation import HarmonicBalanceModel, Interface
 from exugear.steady.harmonics.lines import Group, HarmonicCoupling
 from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, Family, coupled
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers

@@ -12,9 +12,8 @@ from functools import partial
 
 import numpy as np
 
-from exugear.steady.crossings import Crossing
-from exugear.steady.excitation import HarmonicBalanceModel
-from exugear.steady.response import parametric_response
+from exugear.steady.balance.excitation import HarmonicBalanceModel
+from exugear.steady.balance.response import parametric_response
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.threads import side_by_side
 
@@ -28,11 +27,13 @@ EVEN, AT_CROSSINGS = 3, 8
 """Speeds at which lines are judged: some even ones, and those of the strongest crossings of orders with modes."""
 
 
-def judged_speeds(low: float, high: float, crossings: Sequence[Crossing]) -> Floats:
-    """Return the speeds (rad/s) at which the neighbours of lines are judged, between two speeds."""
+def judged_speeds(low: float, high: float, crossings: Sequence[float]) -> Floats:
+    """Return the speeds (rad/s) at which the neighbours of lines are judged, between two speeds.
+
+    `crossings` are speeds at which orders meet modes, those of the strongest first.
+    """
     even = np.linspace(low, high, EVEN)
-    met = [crossing.speed for crossing in crossings[:AT_CROSSINGS]]
-    return np.unique(np.append(even[even != 0.0], met))
+    return np.unique(np.append(even[even != 0.0], crossings[:AT_CROSSINGS]))
 
 
 def with_needed_neighbours(model: HarmonicBalanceModel, speeds: Floats) -> tuple[HarmonicBalanceModel, float]:

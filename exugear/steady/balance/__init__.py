@@ -1,0 +1,1 @@
+"""Balance of all lines at one speed: unknowns; forces linear in the deflections, or evaluated in time."""
