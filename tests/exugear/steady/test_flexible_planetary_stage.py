@@ -140,10 +140,8 @@ def rows_at(waves, psi):
 @pytest.mark.parametrize("speed", [7.4, SPEED])
 def test_a_run_that_starts_on_the_steady_state_stays_there(solver, speed):
     """RK4 at 1/200 kHz. Passing planets are the largest order of the transmission error."""
-    complex_error, amplitude_error = apart(solver, speed, 0.9, 5e-6, 0.6, solver.model.waves.assembly)
-    print(complex_error, amplitude_error)
-    assert amplitude_error < 2e-3
-    assert complex_error < 4e-3
+    complex_error, _ = apart(solver, speed, 0.9, 5e-6, 0.6, solver.model.waves.assembly)
+    assert complex_error < 1e-3
 
 
 def test_damping_takes_the_power_that_the_meshes_give(solver, response):
@@ -200,3 +198,16 @@ def test_what_a_flexible_ring_cannot_have_is_refused_before_any_work(grc, stiffn
 def test_methods_without_the_variation_of_the_ring_are_refused_by_name(drum, method):
     with pytest.raises(SteadyError, match="use --method parametric"):
         response_of(drum, SteadySettings(SpeedRange(*RANGE, 2), method))
+
+
+@pytest.mark.long
+def test_a_run_of_the_grc_with_all_bodies_flexible_stays_on_its_steady_state(grc, stiffness):
+    """RK4 at 1/96 kHz, 336 coordinates. Passing planets, 43 um at three times the carrier's order, are the largest."""
+    assembly = assembled(grc, Choice("flexible"), stiffness)
+    solver = solver_of(assembly, (9.0, 11.0), "parametric", 12, 2)
+    lines = solver.model.lines
+    overall = 2.0 * np.abs(signals(solver.model, solver.response(10.0))[1:, 0])
+    assert lines.orders[1:][np.argmax(overall)] == pytest.approx(3.0)
+    complex_error, amplitude_error = apart(solver, 10.0, 1.5, 1.04e-5, 0.9, solver.model.waves.assembly)
+    assert amplitude_error < 2e-3
+    assert complex_error < 4e-3
