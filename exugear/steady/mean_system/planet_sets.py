@@ -47,7 +47,7 @@ class PlanetSet:
         found = np.full(count or self.waves, 0.5 * self.waves)
         found[0] = self.waves
         if self.waves % 2 == 0:
-            found[self.waves - 1] = self.waves
+            found[self.waves - 1 : self.waves] = self.waves
         return found
 
     def values(self, turned: Floats, count: int | None = None) -> Floats:
