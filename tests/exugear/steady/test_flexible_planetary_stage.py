@@ -185,6 +185,8 @@ def test_a_stiff_ring_and_carrier_give_the_response_of_rigid_ones(grc, stiffness
     ("changes", "said"),
     [
         ({"deviations.one": {"body": "lss", "runout_um": 5.0}}, "deviate"),
+        ({"excitations.one": {"body": "lss", "orders": [2], "torque_N_m": [5.0]}}, "excitations"),
+        ({"bodies.planet.planet_angles_deg": [0.0, 90.0, 180.0, 270.0]}, "4 planets, an even number"),
     ],
 )
 def test_what_a_flexible_ring_cannot_have_is_refused_before_any_work(grc, stiffness, folder, changes, said):
