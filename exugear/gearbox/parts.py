@@ -153,7 +153,7 @@ class PointForce:
 
 @dataclass(frozen=True)
 class VaryingLoad:
-    """Force and moment Re(w exp(i n theta)) |Omega|^p on a body at its angle theta and speed Omega.
+    """Force and moment Re(w exp(i n theta)) s^p on a body at its angle theta and the size s of its speed.
 
     A component A cos(n theta + phi) has w = A exp(i phi). A force of fixed size F that turns with the angle
     n theta + phi has w = F exp(i phi) along x and -i F exp(i phi) along y.
