@@ -28,7 +28,7 @@ NOTICED_CHANGE = 1e-2
 NOTICED_VARIATION = 1e-3
 """Relative variation of stiffness with the carrier angle above which a warning is given."""
 NOTICED_NEIGHBOURS = 1e-2
-"""Share of the meshes' vibration in orders that are left out above which a warning is given."""
+"""Relative change of the vibration by orders that are left out above which a warning is given."""
 NOTICED_SHUTTLING = 0.3
 """Ratio of shuttling moment to transmission error excitation above which a warning is given."""
 LEAST_AMPLITUDE = 1e-12
@@ -177,7 +177,7 @@ def _passing(data: xr.Dataset) -> Iterator[Finding]:
     passing = data["index"].to_numpy()[:, list(data["base"].to_numpy()).index(carrier)]
     count = int(np.count_nonzero(passing))
     text = f"flexible ring gear: {count} orders of passing planets and beside mesh orders are included; those left out "
-    text += f"carry {100.0 * left_out:.1g} % of the vibration of the meshes"
+    text += f"change the transmission error and the deflections of the meshes by at most {100.0 * left_out:.1g} %"
     yield Finding("warning" if left_out > NOTICED_NEIGHBOURS else "note", text, left_out)
 
 

@@ -215,7 +215,7 @@ class SteadyResponse(ReprMixin):
     ring_carrier: str
     """Carrier whose planets pass a flexible ring gear; empty without one."""
     neighbours_left_out: float
-    """Share of the meshes' deflections in orders beside others that were left out, of a flexible ring gear, at most."""
+    """Largest relative change of transmission error and mesh deflections by the orders left out beside others."""
     planet_spread: float
     """Largest change of planet bearings' stiffness that made the planets equal, over that stiffness."""
     stiffness_variation: float

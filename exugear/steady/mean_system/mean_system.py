@@ -291,7 +291,11 @@ def unsuitable(assembly: Assembly, elastic: Collection[str] = ()) -> str:
     except SteadyError as error:
         return str(error)
     planets = {body.name for body in assembly.bodies if body.carrier is not None}
-    return ", ".join(f"bodies.{name}: a flexible planet" for name in elastic if name in planets)
+    return ", ".join(
+        f"bodies.{name}: flexible planets need exugear run, or flexibility = 'none'"
+        for name in elastic
+        if name in planets
+    )
 
 
 def _check(assembly: Assembly) -> None:
