@@ -17,10 +17,10 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse
-import xarray as xr
 
 from fe_ste.elasticity.condensation import Chain, flank_functionals, ring_faces, sector_halves, turn_signs
 from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, sector_mesh
@@ -29,6 +29,9 @@ from fe_ste.tools.arrays import Booleans, Floats, Integers, SparseMatrix
 from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.threads import one_dense_thread
 from fe_ste.transmission_error.contact_stress import PATH_MARGIN
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 COMPONENTS = 3
 """Strains of a gauge: along the section, along the face, shear."""

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from exugear.cli.console import BadInputError, check_results_folder, counted, model_errors, note
-from exugear.cli.options import VARIANT_DESCRIPTIONS
-from exugear.cli.watched import WatchedProject
+from exugear.cli.console import BadInputError, counted, model_errors, note
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import Permissions
 from exugear.gearbox.reading import GearboxFileError, read_toml
 from exugear.gearbox.variant import Variant
-from exugear.project import default_folder
 from exugear.results.folder import bodies_folder
 from exugear.steady.mean_system.mean_system import unsuitable
 from exugear.system.bearings.stiffness import elastic_names
 from exugear.system.bodies.of_gearbox import check_solids
 from exugear.system.build import assemble
-from exugear.system.gearbox_checks import check_parts, errors_of_bearings, gearbox_warnings, lacking, usual_variant
+from exugear.system.gearbox_checks import check_parts, errors_of_bearings, gearbox_warnings, lacking
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
@@ -61,49 +58,6 @@ def check_allow_dir(folder: Path | None) -> None:
         raise BadInputError(
             f"--allow-dir {folder}: no such folder; specify a folder that the gearbox file may read from"
         )
-
-
-def open_project(
-    case: Path,
-    out: Path | None,
-    allow_dir: Path | None,
-    scripts: bool,
-    variant: Variant | None,
-    mesh_model: str = "line_of_action",
-    inertias: str | None = None,
-    load_case: str | None = None,
-    without: Sequence[str] = (),
-) -> WatchedProject:
-    """Read a gearbox file and raise an error for invalid or unavailable model settings; write no files.
-
-    Parameters
-    ----------
-    variant : by default the usual one of the gearbox
-    without : names of excitations that are left out
-    """
-    gearbox = _without(read_gearbox(case, allow_dir, scripts), without)
-    choice = Choice(variant or _chosen_variant(gearbox), str(mesh_model), inertias, load_case)
-    folder = out or default_folder(case)
-    check_choice(gearbox, choice, folder)
-    check_results_folder(folder)
-    return WatchedProject(gearbox, folder, choice)
-
-
-def _without(gearbox: Gearbox, names: Sequence[str]) -> Gearbox:
-    """Leave out excitations by their names."""
-    for name in names:
-        if name not in gearbox.case.excitations:
-            known = ", ".join(gearbox.case.excitations) or "none in the file"
-            raise BadInputError(f"--without {name}: no such excitation; choose one of: {known}")
-    return gearbox.varied({f"excitations.{name}.enabled": False for name in names}) if names else gearbox
-
-
-def _chosen_variant(gearbox: Gearbox) -> Variant:
-    """Return the usual variant of a gearbox, and print which one it is if bearings are not available."""
-    variant = usual_variant(gearbox)
-    if reason := lacking(gearbox, Variant.bushing):
-        note(f"Variant {variant} ({VARIANT_DESCRIPTIONS[variant]}): bushing is not available, {reason}")
-    return variant
 
 
 def assembled_by_iso(gearbox: Gearbox, variant: Variant) -> Assembly:

@@ -5,9 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from functools import partial
+from pathlib import Path
 
+from exugear.cli.case import read_gearbox
 from exugear.cli.tables import Column, Outcome, Table, failure_text, wrapped
+from exugear.cli.watched import WatchedProject
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.variant import Variant
 from exugear.life.rating.sheet import FINITE_ELEMENTS, UNITS, FlankSheet, RatingSheet, sheet_value
+from exugear.project import default_folder
 from exugear.results.findings import Finding
 
 _BLOCKS: Mapping[str, tuple[str, ...]] = {
@@ -126,3 +132,10 @@ def _column(flank: FlankSheet) -> Column:
 def _remarks(sheet: FlankSheet) -> Iterator[str]:
     yield from (f"{sheet.family}: {name} {reason}" for name, reason in sheet.lacking.items())
     yield from (f"{sheet.gear} in {sheet.family}: {remark}" for remark in sheet.remarks)
+
+
+def rate(case: Path, out: Path | None, allow_dir: Path | None, as_json: bool, whole: bool) -> None:
+    """Print the rating of all gears; end with code 1 if a safety factor is below the required one."""
+    gearbox = read_gearbox(case, allow_dir, tell=not as_json)
+    project = WatchedProject(gearbox, out or default_folder(case), Choice(Variant.bushing, "line_of_action"))
+    rating_outcome(project.rating(), str(case), gearbox.name).show(as_json, whole)

@@ -1,22 +1,29 @@
-"""A project that shows the progress of long work, for the commands."""
+"""The project of a command: opened from its options, it shows the progress of long work."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from exugear.cli.bars import Bars, ProgressRow, files_read
-from exugear.cli.console import BadInputError, FailedError, make_results_folder, note, warn
+from exugear.cli.case import check_choice, read_gearbox
+from exugear.cli.console import BadInputError, FailedError, check_results_folder, make_results_folder, note, warn
+from exugear.cli.options import VARIANT_DESCRIPTIONS
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
-from exugear.project import Project
+from exugear.gearbox.variant import Variant
+from exugear.project import Project, default_folder
 from exugear.results.folder import time_noted
 from exugear.results.solver_comparison import SolverComparison
 from exugear.steady.settings import Method, SteadySettings
 from exugear.system.bearings.duty import BearingLoadState
 from exugear.system.bearings.stiffness import elastic_names
 from exugear.system.bodies.elastic_body import ElasticBody
+from exugear.system.gearbox_checks import lacking, usual_variant
 from exugear.system.modes import Modes
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.contact_state import MeshLoadState
@@ -209,3 +216,46 @@ def _computed(request: TableRequest, row: ProgressRow, before: int, total: int) 
         raise BadInputError(f"pairs.{request.name}: {error}") from error
     except (FactorisationError, GridError) as error:
         raise FailedError(f"{request.name}: {error}") from error
+
+
+def open_project(
+    case: Path,
+    out: Path | None,
+    allow_dir: Path | None,
+    scripts: bool,
+    variant: Variant | None,
+    mesh_model: str = "line_of_action",
+    inertias: str | None = None,
+    load_case: str | None = None,
+    without: Sequence[str] = (),
+) -> WatchedProject:
+    """Read a gearbox file and raise an error for invalid or unavailable model settings; write no files.
+
+    Parameters
+    ----------
+    variant : by default the usual one of the gearbox
+    without : names of excitations that are left out
+    """
+    gearbox = _without(read_gearbox(case, allow_dir, scripts), without)
+    choice = Choice(variant or _chosen_variant(gearbox), str(mesh_model), inertias, load_case)
+    folder = out or default_folder(case)
+    check_choice(gearbox, choice, folder)
+    check_results_folder(folder)
+    return WatchedProject(gearbox, folder, choice)
+
+
+def _without(gearbox: Gearbox, names: Sequence[str]) -> Gearbox:
+    """Leave out excitations by their names."""
+    for name in names:
+        if name not in gearbox.case.excitations:
+            known = ", ".join(gearbox.case.excitations) or "none in the file"
+            raise BadInputError(f"--without {name}: no such excitation; choose one of: {known}")
+    return gearbox.varied({f"excitations.{name}.enabled": False for name in names}) if names else gearbox
+
+
+def _chosen_variant(gearbox: Gearbox) -> Variant:
+    """Return the usual variant of a gearbox, and print which one it is if bearings are not available."""
+    variant = usual_variant(gearbox)
+    if reason := lacking(gearbox, Variant.bushing):
+        note(f"Variant {variant} ({VARIANT_DESCRIPTIONS[variant]}): bushing is not available, {reason}")
+    return variant

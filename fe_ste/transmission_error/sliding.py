@@ -7,14 +7,17 @@ with the speed abs(omega_1 (1 + 1/u) x), omega_1 that of gear 1 relative to the 
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from fe_ste.geometry.gears import GearPair
 from fe_ste.standards.mesh_loss import friction_xu_kahraman
 from fe_ste.tools.arrays import Floats
 from fe_ste.transmission_error.contact_stress import contact_line_stress, contact_path
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def table_loss_factor(pair: GearPair, state: xr.Dataset) -> float:

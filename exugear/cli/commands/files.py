@@ -136,11 +136,13 @@ def check(
     as_json: options.JsonOption = False,
 ) -> None:
     """Check a gearbox file and summarise it. Lists gear pairs, bearings and load cases; writes no files."""
-    from exugear.cli.tasks import check as task
-
     if rating:
-        task.rate(case, out, allow_dir, as_json, whole)
+        from exugear.cli.rating_tables import rate
+
+        rate(case, out, allow_dir, as_json, whole)
     else:
+        from exugear.cli.tasks import check as task
+
         task.check(case, allow_dir, as_json, whole)
 
 

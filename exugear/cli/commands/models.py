@@ -74,8 +74,8 @@ def bearings(
     All values are for the static load. Also lists misalignment, load distribution and contact stress of each mesh.
     Transmission error tables that are missing or out of date are computed first.
     """
-    from exugear.cli.case import open_project
     from exugear.cli.tasks import bearings as task
+    from exugear.cli.watched import open_project
 
     variant = variant or Variant.bushing
     if not variant.has_bearings:
@@ -99,8 +99,8 @@ def modes(
     The variant is linearised at the static load. Transmission error tables that are missing or out of date are computed
     first.
     """
-    from exugear.cli.case import open_project
     from exugear.cli.tasks import modes as task
+    from exugear.cli.watched import open_project
 
     task.modes(open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias), as_json, whole)
 
@@ -161,8 +161,8 @@ def steady(
 
     Needs no run-up. Speeds are added where mesh orders cross modes. Missing tables are computed first.
     """
-    from exugear.cli.case import open_project
     from exugear.cli.tasks import steady as task
+    from exugear.cli.watched import open_project
 
     project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias, load_case, without or ())
     if load_case is not None:
@@ -206,8 +206,8 @@ def measured(
     Cuts the mesh orders out of a recording of section [measurements], sweeps and averages the computed ones in the same
     way, and lists peaks with their differences, and orders that belong to no part of the gearbox.
     """
-    from exugear.cli.case import open_project
     from exugear.cli.tasks import measured as task
+    from exugear.cli.watched import open_project
 
     project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias)
     task.measured(project, name, method, fit, as_json, whole)
@@ -270,8 +270,8 @@ def run(
     Results are written during the run; Ctrl-C keeps the results so far. Transmission error tables that are missing or
     out of date are computed first.
     """
-    from exugear.cli.case import open_project
     from exugear.cli.tasks import run as task
+    from exugear.cli.watched import open_project
 
     project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias, load_case, without or ())
     if at_load_case:
@@ -396,8 +396,8 @@ def losses(
     Also computes the efficiency and the oil temperature. Uses the line loads of transmission error tables in the
     results folder. Churning and windage are not included. Writes no files.
     """
-    from exugear.cli.case import open_project
     from exugear.cli.tasks import losses as task
+    from exugear.cli.watched import open_project
 
     project = open_project(case, out, allow_dir, scripts=False, variant=Variant.rigid)
     if load_case is not None:
@@ -421,8 +421,8 @@ def life(
     Lists damage, safety factors, rating lives and the limiting parts for the loads of section [loads]. Transmission
     error tables that are missing or out of date are computed first.
     """
-    from exugear.cli.case import open_project
     from exugear.cli.tasks import life as task
+    from exugear.cli.watched import open_project
 
     task.life(open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias), as_json, whole)
 
@@ -461,8 +461,8 @@ def view(
     It is self-contained and three-dimensional. Operating deflection shapes at resonances need a stored steady-state
     response, see exugear steady.
     """
-    from exugear.cli.case import open_project
     from exugear.cli.tasks import view as task
+    from exugear.cli.watched import open_project
 
     if near is not None and resonance is not None:
         raise BadInputError(f"--near {near:g} and --resonance {resonance}: only one can be shown first; omit one")

@@ -1,4 +1,4 @@
-"""The command `check`: read and check a gearbox file and summarise it, or rate its gears."""
+"""The command `check`: read and check a gearbox file and summarise it."""
 
 from __future__ import annotations
 
@@ -11,17 +11,13 @@ from typing import Any
 
 from exugear.cli.case import assembled_by_iso, read_gearbox, steady_lack
 from exugear.cli.console import BadInputError, FailedError, model_errors, print_json
-from exugear.cli.rating_tables import rating_outcome
 from exugear.cli.tables import HARD_SPACE, Column, Outcome, Table, detail, significant
-from exugear.cli.watched import WatchedProject
-from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import load_case_warnings, summarise_loads
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import OFFERED, Variant
 from exugear.life.rating.lacks import missing_for_life
-from exugear.project import default_folder
 from exugear.results.findings import Finding
 from exugear.results.folder import duty_summary
 from exugear.system.bearings.duty import estimate_effects
@@ -50,13 +46,6 @@ def check(case: Path, allow_dir: Path | None, as_json: bool, whole: bool) -> Non
         findings=[Finding("warning", line) for line in warnings],
         remarks=[*summary["matrices"], *availability(summary)],
     ).show(as_json, whole)
-
-
-def rate(case: Path, out: Path | None, allow_dir: Path | None, as_json: bool, whole: bool) -> None:
-    """Print the rating of all gears; end with code 1 if a safety factor is below the required one."""
-    gearbox = read_gearbox(case, allow_dir, tell=not as_json)
-    project = WatchedProject(gearbox, out or default_folder(case), Choice(Variant.bushing, "line_of_action"))
-    rating_outcome(project.rating(), str(case), gearbox.name).show(as_json, whole)
 
 
 def _read(case: Path, allow_dir: Path | None, as_json: bool) -> Gearbox:

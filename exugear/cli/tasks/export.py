@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from exugear.cli.case import open_project, read_gearbox
+from exugear.cli.case import read_gearbox
 from exugear.cli.console import BadInputError
 from exugear.cli.tables import Column, Outcome, Table
+from exugear.cli.watched import open_project
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant

@@ -7,9 +7,7 @@ import math
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
-
-import xarray as xr
+from typing import TYPE_CHECKING, Any
 
 from exugear.cli.case import assembled_by_iso, check_friction, steady_lack
 from exugear.cli.console import BadInputError, FailedError, not_converged_failure
@@ -40,6 +38,9 @@ from exugear.steady.settings import (
 from exugear.system.modal_damping import damping_in_words
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from exugear.system.tooth_mesh.tables import Shuttling, shuttling_pairs
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def speeds_of_options(project: Project, speeds: str | None, points: int | None) -> SpeedRange:

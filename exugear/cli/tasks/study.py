@@ -6,10 +6,9 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from operator import itemgetter
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from exugear.cli.case import check_allow_dir, check_choice
 from exugear.cli.console import (
@@ -35,6 +34,9 @@ from exugear.studies.sections import LimitSection, StudyError
 from exugear.studies.study import Study
 from exugear.system.gearbox_checks import check_parts
 from exugear.system.tooth_mesh.laws.registry import LAWS
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 SHOWN_FAILURES = 5
 SHOWN_OF_FRONT = 5

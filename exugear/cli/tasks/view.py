@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from exugear.cli.console import BadInputError, FailedError, warn
 from exugear.cli.tables import Outcome
@@ -36,6 +36,9 @@ from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.drawing import RenderingError
 from fe_ste.tools.files import FileError
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 SHOWN_ENERGIES = 3
 """Number of listed fractions of the strain energy."""

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
@@ -38,6 +37,9 @@ from fe_ste.transmission_error.contact_stress import face_load_factor, largest_c
 from fe_ste.transmission_error.cycle import harmonics_of
 from fe_ste.transmission_error.surface import SteSurface
 from fe_ste.transmission_error.table import MeshTable, TableError
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 REFERENCE_VARIANT = Variant.rigid
 """Variant that the others are compared with."""

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
@@ -17,6 +16,9 @@ from exugear.report.findings.parameter_variations import BestChange, ModelVariat
 from exugear.report.findings.words import Labels, figure_text
 from exugear.results.spectra.waterfall import order_lines
 from exugear.steady.peaks import peaks
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # First-order shifts of a natural frequency, from the distribution of strain and kinetic energy
 

@@ -12,10 +12,9 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from exugear.gearbox.choice import Choice
@@ -63,6 +62,9 @@ from exugear.steady.campbell import campbell_from
 from exugear.steady.settings import METHODS
 from exugear.steady.steady_file import settings_of, steady_path
 from fe_ste.tools.arrays import Floats
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 SAME_FREQUENCY = 0.01
 """Relative frequency difference within which a peak or a mode belongs to a resonance. For a mode it is at least its

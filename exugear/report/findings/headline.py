@@ -10,9 +10,9 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.load_cases import operating_range
@@ -28,6 +28,9 @@ from exugear.steady.crossings import Contributions, contributions, loudest_near
 from exugear.steady.point_solver import harmonic_balance_model
 from exugear.steady.steady_file import settings_of
 from exugear.system.tooth_mesh.laws.registry import LAWS
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 SAME_SPEED = 0.01
 """Relative speed difference within which an order crosses the mode of a resonance."""

@@ -11,9 +11,9 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.named_files import Permissions
@@ -24,6 +24,9 @@ from exugear.system.sensitivity import Parameter, ParameterVariation, assumed_pa
 from exugear.system.statics import BalanceError
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.threads import stop_if_asked
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 OCTAVE = 2.0
 """Frequency ratio that limits the band around a mode, in both directions."""

@@ -7,14 +7,17 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.results.spectra.run_spectra import element_words
 from exugear.results.spectra.waterfall import OrderLine
 from fe_ste.tools.display import without_round_off
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 MOTIONS = {
     "spin": ("rotates", "rotate"),

@@ -7,10 +7,9 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
@@ -31,6 +30,9 @@ from exugear.system.statics import BalanceError
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.contact_state import MeshLoadState
 from fe_ste.tools.display import LONGEST_LIFE, life_text, without_round_off
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 CONTACT_LOSS_RATIO = 1.0
 """Dynamic over mean force above which a linear bearing model would lose contact; the page warns then."""

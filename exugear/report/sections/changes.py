@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
@@ -35,6 +34,9 @@ from exugear.results.folder import DESIGN_CHANGES_FILE
 from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.system.sensitivity import ParameterVariation
 from fe_ste.tools.files import FileError
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 CHANGES_NAME = "changes"
 """Identifier of the part."""

@@ -8,10 +8,9 @@ import platform
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.load_cases import static_load_in_words
@@ -40,6 +39,9 @@ from exugear.system.modal_damping import damping_in_words
 from exugear.system.modes import modes_of
 from exugear.system.sensitivity import FrequencyMatch, assumed_parameters, frequency_matches
 from fe_ste.tools.files import FileError
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 PACKAGES = ("exugear", "exudyn", "numpy", "scipy", "numba", "scikit-fem", "xarray", "h5netcdf", "matplotlib", "pyvista")
 """Packages with versions listed in the report."""

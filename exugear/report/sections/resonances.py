@@ -6,10 +6,9 @@ import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.load_cases import static_load_in_words, summarise_loads
@@ -35,6 +34,9 @@ from exugear.steady.campbell import Campbell, campbell_from
 from exugear.steady.peaks import Peak, line_name, peaks, planet_sidebands, sidebands
 from exugear.steady.steady_file import settings_of
 from fe_ste.tools.arrays import Floats
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 SHOWN = NUMBERED
 """Number of resonances that the list shows first."""

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
-from numpy.typing import NDArray
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
@@ -25,6 +23,10 @@ from exugear.report.web.stage import stage_data
 from exugear.results.spectra.run_spectra import VariantRun, report_mode
 from exugear.results.spectra.waterfall import OrderLine, Waterfall
 from fe_ste.tools.arrays import Floats
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
 
 # Waterfalls reduced for the page: levels in bytes, the maximum of each cell, so that no peak is lost
 

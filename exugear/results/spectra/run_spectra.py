@@ -12,7 +12,6 @@ from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from exugear.gearbox.units import RPM
 from exugear.results.run_file import read_run as read_arrays
@@ -31,6 +30,7 @@ from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.display import ReprMixin, TitledRows
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.axes import Axes
 
 # Results of eigenmodes: kinetic and strain energy, and participation in the overall transmission error

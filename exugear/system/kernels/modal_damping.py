@@ -23,14 +23,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from exugear.system.kernels.coordinates import BODY_SIZE, SPIN, TILT
+from exugear.system.kernels.coordinates import SPIN, TILT
 from exugear.system.kernels.products import TILE, add_symmetric
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import kernel
 from fe_ste.tools.octets import SIZE, aligned_zeros
 
-MOVED, ACTING = range(2)
-"""Rows of the memory of `add_modal_damping`."""
+MOVED, ACTING, TURNED = range(3)
+"""Rows of the memory of `add_modal_damping`; in the last one cosine and sine of the angle of each set's carrier."""
 
 
 class ModalArrays(NamedTuple):
@@ -68,28 +68,24 @@ def share_of_planet(i: int, j: int, count: int, cosine: float) -> float:
 
 
 @kernel
-def turn_planets(q: Floats, modal: ModalArrays, back: bool, given: Floats, out: Floats) -> None:
-    """Set the planets' entries of `out` to S given, or to S^T given with `back`; others are left as they are."""
+def turn_planets(turned: Floats, modal: ModalArrays, back: bool, given: Floats, out: Floats) -> None:
+    """Set the planets' entries of `out` to S given, or to S^T given with `back`; others are left as they are.
+
+    `turned` has cosine and sine of the angle of each set's carrier, one after the other.
+    """
     for s in range(modal.frame.size):
         begin = modal.first[s]
         count = modal.first[s + 1] - begin
-        turned = 0.0
-        if modal.frame[s] >= 0:
-            turned = q[modal.frame[s]]
-            if back:
-                turned = -turned
-        cosine = math.cos(turned)
-        sine = math.sin(turned)
+        cosine = turned[2 * s]
+        sine = -turned[2 * s + 1] if back else turned[2 * s + 1]
         for a in range(count):
-            to = modal.planets[begin + a]
-            for axis in range(BODY_SIZE):
-                if to[axis] >= 0:
-                    out[to[axis]] = 0.0
+            own = modal.place[begin + a]
+            # Sums over the planets stay in registers.
+            x = y = z = tilt_x = tilt_y = spin = 0.0
             for b in range(count):
                 if modal.equal[s] == 0 and a != b:
                     continue
                 # From the place of one planet before to that of the other now; back, the other way round.
-                own = modal.place[begin + a]
                 other = modal.place[begin + b]
                 along = own[0] * other[0] + own[1] * other[1]
                 across = own[1] * other[0] - own[0] * other[1]
@@ -101,15 +97,20 @@ def turn_planets(q: Floats, modal: ModalArrays, back: bool, given: Floats, out: 
                 c *= weight
                 d *= weight
                 of = modal.planets[begin + b]
-                if to[0] >= 0:
-                    for plane in range(0, SPIN, TILT):
-                        x = given[of[plane]]
-                        y = given[of[plane + 1]]
-                        out[to[plane]] += c * x - d * y
-                        out[to[plane + 1]] += d * x + c * y
-                    out[to[2]] += weight * given[of[2]]
-                if to[SPIN] >= 0:
-                    out[to[SPIN]] += weight * given[of[SPIN]]
+                if of[0] >= 0:
+                    x += c * given[of[0]] - d * given[of[1]]
+                    y += d * given[of[0]] + c * given[of[1]]
+                    z += weight * given[of[2]]
+                    tilt_x += c * given[of[TILT]] - d * given[of[TILT + 1]]
+                    tilt_y += d * given[of[TILT]] + c * given[of[TILT + 1]]
+                if of[SPIN] >= 0:
+                    spin += weight * given[of[SPIN]]
+            to = modal.planets[begin + a]
+            if to[0] >= 0:
+                out[to[0]], out[to[1]], out[to[2]] = x, y, z
+                out[to[TILT]], out[to[TILT + 1]] = tilt_x, tilt_y
+            if to[SPIN] >= 0:
+                out[to[SPIN]] = spin
 
 
 @kernel
@@ -126,13 +127,17 @@ def add_modal_damping(q: Floats, v: Floats, modal: ModalArrays | None, memory: F
     acting[:] = 0.0
     for i in range(size):
         moved[i] = v[i]
-    turn_planets(q, modal, True, v, moved)
+    turned = memory[TURNED]
+    for s in range(modal.frame.size):
+        angle = q[modal.frame[s]] if modal.frame[s] >= 0 else 0.0
+        turned[2 * s], turned[2 * s + 1] = math.cos(angle), math.sin(angle)
+    turn_planets(turned, modal, True, v, moved)
     add_symmetric(modal.tiles, 0, acting.size, moved, acting)
     power = 0.0
     for i in range(size):
         power += moved[i] * acting[i]
         moved[i] = acting[i]
-    turn_planets(q, modal, False, acting, moved)
+    turn_planets(turned, modal, False, acting, moved)
     for i in range(size):
         f[i] -= moved[i]
     return power
@@ -156,8 +161,8 @@ def modal_matrix(q: Floats, modal: ModalArrays | None) -> Floats:
 
 
 def modal_memory(modal: ModalArrays | None) -> Floats:
-    """Memory for `add_modal_damping`, (2, c) with c filled up; what is filled up stays zero."""
+    """Memory for `add_modal_damping`, (3, c) with c filled up; what is filled up stays zero."""
     if modal is None:
-        return np.zeros((2, 0))
+        return np.zeros((3, 0))
     rows = math.isqrt(2 * modal.tiles.size // TILE)  # n (n + 1) / 2 tiles
-    return aligned_zeros(2 * SIZE * rows).reshape(2, -1)
+    return aligned_zeros(3 * SIZE * rows).reshape(3, -1)

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import xarray as xr
+from typing import TYPE_CHECKING, Any
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.system.tooth_mesh.tables import TABLE_FOLDER, requested_tables
 from fe_ste.reference.newton import Iteration
 from fe_ste.reference.table import NonlinearInput, NonlinearTable
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 #: Positions of the mesh cycle unless asked for otherwise: one takes about half a minute.
 DEFAULT_POSITIONS = 10

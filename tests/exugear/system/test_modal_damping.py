@@ -100,12 +100,11 @@ def test_turning_planets_is_orthogonal_and_carries_each_into_the_place_of_the_ne
     )
 
     def turned(angle: float, *, back: bool) -> np.ndarray:
-        q = np.zeros(size)
-        q[0] = angle
+        cosine_and_sine = np.array([np.cos(angle), np.sin(angle)])
         columns = []
         for unit in np.eye(size):
             out = unit.copy()
-            turn_planets(q, arrays, back, unit, out)
+            turn_planets(cosine_and_sine, arrays, back, unit, out)
             columns.append(out)
         return np.array(columns).T
 

@@ -6,11 +6,9 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-import xarray as xr
-from numpy.typing import ArrayLike
 
 import exugear
 from exugear.exchange.rexs.containers import read_rexs, with_additions
@@ -43,6 +41,10 @@ from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.files import FileError
 from fe_ste.transmission_error.contact_stress import face_load_factor, largest_contact_stress, load_along_face
 from fe_ste.transmission_error.table import MeshTable, TableError
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import ArrayLike
 
 Result = TypeVar("Result")
 Member = TypeVar("Member")
