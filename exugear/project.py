@@ -26,6 +26,7 @@ from exugear.results.folder import (
     modes_path,
     read_stored_gearbox,
     run_directory,
+    stored_source,
     time_noted,
     write_duties,
 )
@@ -118,10 +119,10 @@ class Project(ReprMixin):
         Raises
         ------
         GearboxFileError
-            The file is invalid.
+            The file is invalid, or its default folder contains the results of another file.
         """
         gearbox = Gearbox.from_toml(case, permissions)
-        return cls(gearbox, default_folder(case) if folder is None else Path(folder), choice or Choice())
+        return cls(gearbox, results_folder(case, folder), choice or Choice())
 
     @classmethod
     def from_folder(
@@ -683,3 +684,28 @@ def default_folder(case: str | Path) -> Path:
     'results/grc750'
     """
     return Path("results") / Path(case).resolve().parent.name
+
+
+def results_folder(case: str | Path, out: str | Path | None = None) -> Path:
+    """Return the folder for the results of a gearbox file: `out`, or else the default one.
+
+    Raises
+    ------
+    GearboxFileError
+        The default folder contains the results of another gearbox file, which still exists.
+
+    Examples
+    --------
+    >>> results_folder("cases/grc750/gearbox.toml", "elsewhere").as_posix()
+    'elsewhere'
+    """
+    if out is not None:
+        return Path(out)
+    folder = default_folder(case)
+    other = stored_source(folder)
+    if other is not None and other.is_file() and Path(case).is_file() and not other.samefile(case):
+        raise GearboxFileError(
+            f"{case}: {folder} contains the results of another file, {other.name}; specify a folder for this one: "
+            f"--out {folder}-{Path(case).stem}"
+        )
+    return folder

@@ -13,7 +13,7 @@ from exugear.cli.watched import WatchedProject
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.variant import Variant
 from exugear.life.rating.sheet import FINITE_ELEMENTS, UNITS, FlankSheet, RatingSheet, sheet_value
-from exugear.project import default_folder
+from exugear.project import results_folder
 from exugear.results.findings import Finding
 
 _BLOCKS: Mapping[str, tuple[str, ...]] = {
@@ -137,5 +137,5 @@ def _remarks(sheet: FlankSheet) -> Iterator[str]:
 def rate(case: Path, out: Path | None, allow_dir: Path | None, as_json: bool, whole: bool) -> None:
     """Print the rating of all gears; end with code 1 if a safety factor is below the required one."""
     gearbox = read_gearbox(case, allow_dir, tell=not as_json)
-    project = WatchedProject(gearbox, out or default_folder(case), Choice(Variant.bushing, "line_of_action"))
+    project = WatchedProject(gearbox, results_folder(case, out), Choice(Variant.bushing, "line_of_action"))
     rating_outcome(project.rating(), str(case), gearbox.name).show(as_json, whole)

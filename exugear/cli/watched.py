@@ -16,7 +16,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.variant import Variant
-from exugear.project import Project, default_folder
+from exugear.project import Project, results_folder
 from exugear.results.folder import time_noted
 from exugear.results.solver_comparison import SolverComparison
 from exugear.steady.settings import Method, SteadySettings
@@ -238,7 +238,7 @@ def open_project(
     """
     gearbox = _without(read_gearbox(case, allow_dir, scripts), without)
     choice = Choice(variant or _chosen_variant(gearbox), str(mesh_model), inertias, load_case)
-    folder = out or default_folder(case)
+    folder = results_folder(case, out)
     check_choice(gearbox, choice, folder)
     check_results_folder(folder)
     return WatchedProject(gearbox, folder, choice)

@@ -37,6 +37,15 @@ def keep_case(gearbox: Gearbox, folder: Path) -> None:
     write_file(folder / CASE_FILE, json.dumps({**kept, "checksum": _checksum(kept)}, indent=1).encode("utf-8"))
 
 
+def stored_source(folder: Path) -> Path | None:
+    """Return the path of the gearbox file that the results in a folder belong to; None without one that can be read."""
+    try:
+        kept = json.loads(read_text(folder / CASE_FILE))
+        return Path(kept["source"])
+    except (FileError, ValueError, KeyError, TypeError, RecursionError):
+        return None
+
+
 def _checksum(kept: dict[str, Any]) -> str:
     """Checksum of the stored content of a gearbox file, independent of its formatting."""
     text = json.dumps([kept["source"], kept["content"]], sort_keys=True)

@@ -11,13 +11,13 @@ from exugear.cli.case import check_allow_dir
 from exugear.cli.console import BadInputError, StoppedError, check_results_folder, note, say
 from exugear.cli.edit.server import EditServer
 from exugear.gearbox.reading import read_text
-from exugear.project import default_folder
+from exugear.project import results_folder
 
 
 def edit(case: Path, out: Path | None, allow_dir: Path | None, port: int, browser: bool) -> None:
     """Serve the page of a gearbox file until no page is open."""
     check_allow_dir(allow_dir)
-    folder = out or default_folder(case)
+    folder = results_folder(case, out)
     check_results_folder(folder)
     if not case.is_file():
         raise BadInputError(f"{case}: no such file; write one to start from by: exugear new {case}")

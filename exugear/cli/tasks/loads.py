@@ -13,7 +13,7 @@ from exugear.cli.console import check_results_folder, make_results_folder
 from exugear.cli.tables import Column, Outcome, Table, detail, significant
 from exugear.gearbox.gearbox import Gearbox
 from exugear.life.load_spectrum.counted import count_loads, draw_duration, write_spectra
-from exugear.project import default_folder
+from exugear.project import results_folder
 from exugear.results.findings import Finding
 
 HUB_LEGEND = "Range in kN (forces) and kN m (moments), one cycle per second, by S-N exponent."
@@ -21,7 +21,7 @@ HUB_LEGEND = "Range in kN (forces) and kN m (moments), one cycle per second, by 
 
 def loads(gearbox: Gearbox, out: Path | None, as_json: bool, whole: bool) -> None:
     """Count, store and print the loads of a gearbox."""
-    folder = (out or default_folder(gearbox.source)) / "loads"
+    folder = results_folder(gearbox.source, out) / "loads"
     check_results_folder(folder)
     with Bars().row() as row:
         counted = count_loads(gearbox, files_read(row))

@@ -22,9 +22,10 @@ from exugear.cli.tables import Column, Outcome, Table
 from exugear.cli.watched import WatchedProject
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.named_files import Permissions
+from exugear.gearbox.reading import GearboxFileError, read_toml
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
-from exugear.project import default_folder
+from exugear.project import default_folder, results_folder
 from exugear.report.design_study import at_load
 from exugear.report.findings.context import ReportError, choice_of
 from exugear.report.findings.design_changes import LEAST_DB, DesignStudy, settings_of_study
@@ -32,10 +33,10 @@ from exugear.report.findings.other_design import check_ranges
 from exugear.report.findings.words import QUANTITIES
 from exugear.report.writer import Report, write_report
 from exugear.results.findings import Finding
-from exugear.results.folder import CASE_FILE, read_stored_gearbox, time_noted, times_spent
+from exugear.results.folder import CASE_FILE, read_stored_gearbox, stored_source, time_noted, times_spent
 from exugear.results.run_file import load_run
 from exugear.steady.settings import SteadySettings, operating_speeds
-from exugear.steady.steady_file import load_response
+from exugear.steady.steady_file import load_response, settings_of
 from exugear.system.gearbox_checks import usual_variant
 from exugear.system.modes import load_modes
 from exugear.system.tooth_mesh.laws.registry import LAWS
@@ -97,6 +98,18 @@ def report(
     _outcome(folder, written, study).show(as_json, whole)
 
 
+def _changed_since(folder: Path) -> list[Finding]:
+    """Return a warning if the gearbox file has changed since the results in its folder were computed."""
+    source = stored_source(folder)
+    try:
+        if source is None or read_toml(source) == read_stored_gearbox(folder).content:
+            return []
+    except GearboxFileError:  # moved, being edited, or with files that need permission: nothing can be said
+        return []
+    text = f"{source.name} has changed since these results were computed; for the present one: exugear steady {source}"
+    return [Finding("warning", text)]
+
+
 def _check_comparison(folder: Path, other: Path, allow_dir: Path | None) -> None:
     """Refuse another design that cannot be compared, before anything is computed."""
     permissions = Permissions(below=allow_dir)
@@ -111,30 +124,37 @@ def _check_comparison(folder: Path, other: Path, allow_dir: Path | None) -> None
 def _compute_missing(folder: Path, allow_dir: Path | None) -> None:
     """Compute missing modes of all models with results, and a response of the one with most degrees of freedom.
 
-    Existing files stay as they are, even if they are damaged or belong to other input. What takes long (tables, contact
-    loss) or fails is left to the report, which lists it with its command.
+    Modes and responses of another input are missing, too: a report of a changed gearbox would otherwise fall back to an
+    estimate. What takes long (tables, contact loss) or fails is left to the report, which lists it with its command.
     """
     models = []
+    responses = []
     loaders = {"run.nc": lambda path: load_run(path, ()), "modes.nc": load_modes, "steady-*.nc": load_response}
     for name, load in loaders.items():
         for path in sorted(folder.glob(f"*/*/{name}")):
             with suppress(FileError, ValueError, KeyError):
-                models.append(choice_of(load(path).attrs))
+                attributes = load(path).attrs
+                models.append(choice_of(attributes))
+                if load is load_response:
+                    responses.append(attributes)
     if not models:
         return
     with suppress(BadInputError, FailedError), model_errors():
         project = WatchedProject(read_stored_gearbox(folder, Permissions(below=allow_dir)), folder)
         chosen = [replace(project, choice=model) for model in dict.fromkeys(models)]
         ready = [own for own in chosen if LAWS[own.choice.mesh_model].has_force and not own.missing_tables()]
-        for own in ready:
-            if not own.modes_path.exists():
-                own.modes()
+        assemblies = {own.choice: own.modes().assembly for own in ready}
         linear = [
             own
             for own in ready
             if (law := LAWS[own.choice.mesh_model]).needs_tables and not law.loses_contact  # excited, and linear
         ]
-        if linear and not any(folder.glob("*/*/steady-*.nc")):
+        fits = any(
+            choice_of(attributes) in assemblies
+            and settings_of(attributes).hash_with(assemblies[choice_of(attributes)]) == attributes["input_hash"]
+            for attributes in responses
+        )
+        if linear and not fits:
             richest = max(linear, key=lambda own: list(Variant).index(own.choice.variant))
             richest.steady(SteadySettings(operating_speeds(project.gearbox)))
 
@@ -170,7 +190,7 @@ def _design_changes(folder: Path, allow_dir: Path | None, changes: DesignOptions
 def _results_of(folder: Path) -> Path:
     """Return the default results folder of a gearbox file, or of that in a folder if only this one contains results."""
     if folder.suffix == ".toml" and folder.is_file():
-        return default_folder(folder)
+        return results_folder(folder)
     below = default_folder(folder / "gearbox.toml")
     if (folder / CASE_FILE).is_file() or not (below / CASE_FILE).is_file() or not any(folder.glob("*.toml")):
         return folder
@@ -197,7 +217,8 @@ def _outcome(folder: Path, written: Report, study: DesignStudy | None) -> Outcom
         verdict = highest_resonance(written.gearbox, headline.ranking)
         model = f"{headline.choice.variant}, {headline.source}"
         tables.insert(0, resonance_table(written.gearbox, headline.ranking, model))
-    findings = [*written.findings, *(Finding("warning", f"skipped: {line}") for line in written.left_out)]
+    findings = [*_changed_since(folder), *written.findings]
+    findings += [Finding("warning", f"skipped: {line}") for line in written.left_out]
     if study is not None:
         tables.insert(0, _changes(study))
         findings += _unmet(study)

@@ -13,7 +13,7 @@ from exugear.exchange.rexs.to_case.conversion import Imported, to_case
 from exugear.exchange.rexs.to_case.loads import SPECTRUM
 from exugear.exchange.rexs.to_case.notes import Rules
 from exugear.exchange.rexs.tree import RexsError
-from exugear.project import default_folder
+from exugear.project import results_folder
 from exugear.results.findings import Finding
 from fe_ste.tools.files import write_file
 
@@ -92,7 +92,7 @@ def export_rexs(
         raise BadInputError(f"{target}: exists already; specify another file with --to")
     gearbox = read_gearbox(case, allow_dir)
     try:
-        exported = with_results(gearbox, out or default_folder(case), rexs, rules)
+        exported = with_results(gearbox, results_folder(case, out), rexs, rules)
     except RexsError as error:
         raise BadInputError(error) from error
     write_file(target, exported.content)

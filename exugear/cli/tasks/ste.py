@@ -23,7 +23,7 @@ from exugear.cli.watched import WatchedProject, errors_of_tables
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.variant import Variant
-from exugear.project import default_folder
+from exugear.project import results_folder
 from exugear.report.pictures.diagrams import contact_picture, draw_contact, draw_curves
 from exugear.results.findings import Finding
 from exugear.results.folder import keep_case, time_noted
@@ -66,7 +66,7 @@ def ste(
     """Compute, store and print the tables of the pairs of a gearbox."""
     if positions is not None and positions < LEAST_TABLE_POSITIONS:
         raise BadInputError(f"--positions {positions}: a table for dynamics requires at least {LEAST_TABLE_POSITIONS}")
-    project = WatchedProject(gearbox, out or default_folder(gearbox.source), Choice(Variant.bushing))
+    project = WatchedProject(gearbox, results_folder(gearbox.source, out), Choice(Variant.bushing))
     folder = project.folder
     requests = _requested_tables(project, names, positions, grid)
     with time_noted(folder, "tables of transmission error"):
@@ -167,7 +167,7 @@ def references(
     gearbox: Gearbox, out: Path | None, names: list[str], positions: int | None, as_json: bool, whole: bool
 ) -> None:
     """Run the reference analysis of the pairs and print results; each position is stored when it is complete."""
-    folder = out or default_folder(gearbox.source)
+    folder = results_folder(gearbox.source, out)
     requests = requested_references(gearbox, folder, names, positions)
     make_results_folder(folder)
     keep_case(gearbox, folder)

@@ -22,7 +22,7 @@ from exugear.cli.process import let_in_dask
 from exugear.cli.tables import Column, Outcome, Table, failure_text, significant
 from exugear.gearbox.named_files import Permissions
 from exugear.gearbox.reading import GearboxFileError
-from exugear.project import default_folder
+from exugear.project import results_folder
 from exugear.results.findings import Finding
 from exugear.results.folder import STUDIES
 from exugear.studies.dataset import EVALUATION, Criteria, judged_name, slopes
@@ -66,7 +66,7 @@ def study(
             "remove --shard, --merge and --retry-failed"
         )
     stem = Path(read.source).name.removesuffix(".toml").removesuffix(".study") or "study"
-    folder = folder or default_folder(read.gearbox.source) / STUDIES / stem
+    folder = folder or results_folder(read.gearbox.source) / STUDIES / stem
     check_choice(read.gearbox, read.choice, folder)
     make_results_folder(folder)
     try:
