@@ -310,7 +310,8 @@ class Project(ReprMixin):
 
         Parameters
         ----------
-        settings : speeds and method; by default the speed range of the first load case, and `parametric`
+        settings : speeds and method; by default `parametric`, up to the highest speed of the first load case and of
+            ``[operation]``
         progress : called with the number of finished speeds and the total
         """
         from exugear.steady.steady_file import stored_or_computed  # kernels that a run does not need

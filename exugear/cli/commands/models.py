@@ -131,7 +131,8 @@ def steady(
         str | None,
         typer.Option(
             metavar="FIRST:LAST",
-            help="Range of input speeds, rpm, positive about +z. (default: range of the first load case)",
+            help="Range of input speeds, rpm, positive about +z. (default: from standstill to the highest of the first "
+            "load case and of [operation])",
             show_default=False,
         ),
     ] = None,

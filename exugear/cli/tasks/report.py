@@ -141,12 +141,16 @@ def _compute_missing(folder: Path, allow_dir: Path | None) -> None:
         return
     with suppress(BadInputError, FailedError), model_errors():
         project = WatchedProject(read_stored_gearbox(folder, Permissions(below=allow_dir)), folder)
-        chosen = [replace(project, choice=model) for model in dict.fromkeys(models)]
-        ready = [own for own in chosen if LAWS[own.choice.mesh_model].has_force and not own.missing_tables()]
-        assemblies = {own.choice: own.modes().assembly for own in ready}
+        chosen = {model: replace(project, choice=model) for model in models}
+        ready = {
+            model: own
+            for model, own in chosen.items()
+            if LAWS[own.choice.mesh_model].has_force and not own.missing_tables()
+        }
+        assemblies = {model: own.modes().assembly for model, own in ready.items()}
         linear = [
             own
-            for own in ready
+            for own in ready.values()
             if (law := LAWS[own.choice.mesh_model]).needs_tables and not law.loses_contact  # excited, and linear
         ]
         fits = any(

@@ -141,6 +141,13 @@ class Headline:
         wide = ranking_of(self.response, (BEYOND[0] * low, BEYOND[1] * high), self.ranking.wanted)
         return next((own for own in wide.resonances if not low <= abs(own.speed) <= high), None)
 
+    def computed_up_to(self) -> float | None:
+        """Return the highest computed speed (rad/s) if it is less than `BEYOND` above the range; None otherwise."""
+        if self.response is None or self.ranking.whole:
+            return None
+        highest = float(np.abs(self.response["speed"].to_numpy()).max())
+        return highest if highest < (1.0 - SAME_SPEED) * BEYOND[1] * self.ranking.speeds[1] else None
+
 
 def headline_of_group(group: RunGroup) -> Headline:
     """Return the ranking of the main variant of a result group."""

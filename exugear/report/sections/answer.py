@@ -32,7 +32,10 @@ from exugear.report.sections.resonances import SHOWN, note_of, sorted_quantities
 from exugear.report.web.html import render
 from exugear.report.web.stage import drawn_bodies, drawn_mode
 from exugear.steady.crossings import Contributions
+from exugear.steady.findings import NOTICED_SHUTTLING
 from exugear.system.modal_damping import damping_in_words
+from exugear.system.tooth_mesh.laws.registry import LAWS
+from exugear.system.tooth_mesh.tables import shuttling_pairs
 
 COUNTED = 1e-3
 """Amplitude, over the highest of its quantity, from which a peak counts in "rank 3 of 40": 60 dB."""
@@ -105,7 +108,7 @@ def answer_section(material: ReportData) -> Part:
         "strips": [_strips(material, headline, drawn, size) for size in STRIPS if drawn],
         "drawn": caption,
         "resonance": _resonance_box(material, headline, mode),
-        "cause": _cause_box(material, top, known),
+        "cause": _cause_box(material, headline, top, known),
         "remedy": _remedy_box(material, headline),
         "further": list(_further(material, headline, top, curves)),
     }
@@ -252,7 +255,7 @@ def _resonance_box(material: ReportData, headline: Headline, mode: MatchedMode |
     )
 
 
-def _cause_box(material: ReportData, top: Resonance, known: Contributions | None) -> Box:
+def _cause_box(material: ReportData, headline: Headline, top: Resonance, known: Contributions | None) -> Box:
     found = excitations(material.context, material.results)
     causes = causes_of(material.context, material.words, top, found, known)
     line = material.words.order(top.line, top.order)
@@ -269,6 +272,16 @@ def _cause_box(material: ReportData, top: Resonance, known: Contributions | None
     if shared:
         shares = ", ".join(f"{material.words.of(cause.pair)} {100.0 * (cause.share or 0.0):.0f} %" for cause in shared)
         facts.append(("TE contribution", shares))
+    if LAWS[headline.choice.mesh_model].moves_load and not headline.choice.variant.spins_only:
+        context = material.context
+        moved = {own.pair: own for own in shuttling_pairs(context.gearbox, context.folder, first.harmonic)}
+        own = moved.get(first.pair)
+        if own is not None and own.over_error > NOTICED_SHUTTLING:
+            moving = (
+                f"load moves by ±{rounded_text(1e3 * own.amplitude)} mm along the face; its moment excites tilting "
+            )
+            moving += f"gears, {rounded_text(own.over_error)} times as strongly as the transmission error"
+            facts.append(("Shuttling", moving))
     overlap = f"{rounded_text(first.overlap)}"
     if first.overlap == 0.0:
         overlap += " (spur gears)"
@@ -307,9 +320,14 @@ def _further(
     if rated is not None and curves:
         yield f"At rated speed, {rounded_text(rated)} rpm", _rated_lines(headline, curves, rated)
     outside = headline.outside()
+    lines = []
     if outside is not None:
         peaks = ", ".join(amplitude_text(name, own.amplitude) for name, own in outside.amplitudes.items())
-        yield "Just outside the range", [f"{rounded_text(outside.frequency)} Hz at {speed_text(outside)}: {peaks}."]
+        lines.append(f"{rounded_text(outside.frequency)} Hz at {speed_text(outside)}: {peaks}.")
+    if (ends := headline.computed_up_to()) is not None:
+        lines.append(f"Nothing is computed above {rounded_text(ends / RPM)} rpm.")
+    if lines:
+        yield "Just outside the range", lines
     if doubts := list(_doubts(material, headline, top)):
         yield "What could change this answer", [short(*doubts)]
 

@@ -61,7 +61,8 @@ GLOSSARY = {
     "prominence": "Height of a peak above the higher of the two adjacent minima, dB.",
     "± Hz": "Frequency resolution of the run-up: the larger of 1 / window length and the square root of the sweep rate "
     "of the order.",
-    "amplification": "Overall transmission error at resonance per static transmission error of one mesh.",
+    "amplification": "Overall transmission error at resonance per static transmission error of one mesh; shuttling of "
+    "the load comes on top.",
     "TE participation": "Participation of a mode in the overall transmission error, squared and mass-normalised.",
     "energy fraction": "Part of the strain or kinetic energy of a mode that is in one element or body.",
     "variant": "Support of the shafts: ideal joints (rigid), elastic bearings (bushing), flexible bodies (flexible).",

@@ -165,7 +165,10 @@ def range_text(ranking: Ranking) -> str:
 def note_of(material: ReportData, headline: Headline) -> str:
     """Say what the amplitudes of a ranking are of."""
     if headline.group is None:
-        return "Estimate: amplification of the mode times static transmission error; exugear steady computes more."
+        return (
+            "Estimate: amplification of the mode times static transmission error, without shuttling of the load, which "
+            "may cause several times as much; run exugear steady."
+        )
     if headline.response is None:
         return "Amplitudes in the run-up; exugear steady adds bearing forces and accelerations at constant speed."
     return _ranked_by(material, headline.ranking)

@@ -507,7 +507,7 @@ LEAST_PUSH = 1e-6
 
 @dataclass(frozen=True)
 class Shuttling:
-    """Shuttling amplitude of the load along the face, first harmonic.
+    """Shuttling amplitude of the load along the face, one harmonic.
 
     Examples
     --------
@@ -519,7 +519,7 @@ class Shuttling:
     amplitude: float
     """Of the load centre, m."""
     over_error: float
-    """Its moment as forces at the ends of the face, over the force that the first harmonic of the transmission error
+    """Its moment as forces at the ends of the face, over the force that the same harmonic of the transmission error
     makes of the mean stiffness."""
 
     @property
@@ -531,12 +531,13 @@ class Shuttling:
         )
 
 
-def shuttling_pairs(gearbox: Gearbox, folder: Path) -> tuple[Shuttling, ...]:
+def shuttling_pairs(gearbox: Gearbox, folder: Path, harmonic: int = 1) -> tuple[Shuttling, ...]:
     """Return the shuttling of each pair with a table, at the static load, largest effect first.
 
     Parameters
     ----------
     folder : results folder
+    harmonic : of the mesh frequency
     """
     loads = []
     for name, pair in {mesh.pair.name: mesh.pair for mesh in gearbox.meshes}.items():
@@ -544,23 +545,23 @@ def shuttling_pairs(gearbox: Gearbox, folder: Path) -> tuple[Shuttling, ...]:
             continue
         with suppress(TableError, GapError):  # no law along a row takes such a table
             point = complete_cycle(fitting_table(gearbox, name, folder).static_state)
-            loads.append(_way(name, point, pair.face_width))
+            loads.append(_way(name, point, pair.face_width, harmonic))
     return tuple(sorted(loads, key=lambda own: -own.over_error))
 
 
-def _way(name: str, point: xr.Dataset, width: float) -> Shuttling:
+def _way(name: str, point: xr.Dataset, width: float, harmonic: int) -> Shuttling:
     centre, error, stiffness = (
         np.asarray(point[key].to_numpy(), dtype=np.float64).reshape(-1)
         for key in ("load_centroid", "ste", "mesh_stiffness")
     )
     force = float(point["line_of_action_force"].mean())
-    at_ends = force * _first_harmonic(centre) / (0.5 * width)
-    pushed = max(stiffness.mean() * _first_harmonic(error), LEAST_PUSH * force)
-    return Shuttling(name, _first_harmonic(centre), float(at_ends / pushed))
+    amplitude = _harmonic(centre, harmonic)
+    pushed = max(stiffness.mean() * _harmonic(error, harmonic), LEAST_PUSH * force)
+    return Shuttling(name, amplitude, float(force * amplitude / (0.5 * width) / pushed))
 
 
-def _first_harmonic(values: Floats) -> float:
-    """Amplitude of the first harmonic of a cycle."""
-    if len(values) > 2:
-        return float(2.0 * np.abs(np.fft.rfft(values)[1]) / len(values))
+def _harmonic(values: Floats, number: int) -> float:
+    """Amplitude of a harmonic of a cycle; zero for one that its positions do not resolve."""
+    if len(values) > 2 * number:
+        return float(2.0 * np.abs(np.fft.rfft(values)[number]) / len(values))
     return 0.0
