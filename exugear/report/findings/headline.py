@@ -141,6 +141,19 @@ class Headline:
         wide = ranking_of(self.response, (BEYOND[0] * low, BEYOND[1] * high), self.ranking.wanted)
         return next((own for own in wide.resonances if not low <= abs(own.speed) <= high), None)
 
+    def is_axial(self, resonance: Resonance, support: str) -> bool:
+        """Return whether the force on a bearing or mount at a resonance is larger along the shaft than across it."""
+        if self.response is None:
+            return False
+        names = [str(name) for name in self.response["signal"].to_numpy()]
+        wanted = [f"support_force {support} {axis}" for axis in "xyz"]
+        if not set(wanted) <= set(names):
+            return False
+        point = int(np.argmin(np.abs(self.response["speed"].to_numpy() - resonance.speed)))
+        line = int(np.argmin(np.abs(self.response["order"].to_numpy() - resonance.order)))
+        x, y, z = (float(self.response["amplitude"][point, line, names.index(name)]) for name in wanted)
+        return z > float(np.hypot(x, y))
+
     def computed_up_to(self) -> float | None:
         """Return the highest computed speed (rad/s) if it is less than `BEYOND` above the range; None otherwise."""
         if self.response is None or self.ranking.whole:

@@ -198,6 +198,9 @@ def _quantity(material: ReportData, headline: Headline, top: Resonance, name: st
     band = ""
     if own.limits is not None:
         band = " to ".join(rounded_text(label.factor * limit.amplitude) for limit in reversed(own.limits))
+    place = material.words.of(own.at) if own.at else "input to output"
+    if name == "force" and own.at and headline.is_axial(top, own.at):
+        place += ", mostly axial"
     return {
         "name": name,
         "title": label.title,
@@ -206,7 +209,7 @@ def _quantity(material: ReportData, headline: Headline, top: Resonance, name: st
         "band": band,
         "rank": own.place or "–",
         "of": f" of {count}" * bool(own.place),
-        "place": material.words.of(own.at) if own.at else "input to output",
+        "place": place,
     }
 
 
@@ -277,10 +280,9 @@ def _cause_box(material: ReportData, headline: Headline, top: Resonance, known: 
         moved = {own.pair: own for own in shuttling_pairs(context.gearbox, context.folder, first.harmonic)}
         own = moved.get(first.pair)
         if own is not None and own.over_error > NOTICED_SHUTTLING:
-            moving = (
-                f"load moves by ±{rounded_text(1e3 * own.amplitude)} mm along the face; its moment excites tilting "
-            )
-            moving += f"gears, {rounded_text(own.over_error)} times as strongly as the transmission error"
+            size = rounded_text(1e3 * own.amplitude)
+            moving = f"load moves by ±{size} mm along the face; its moment excites tilting gears, "
+            moving += f"{rounded_text(own.over_error)} times as strongly as the transmission error"
             facts.append(("Shuttling", moving))
     overlap = f"{rounded_text(first.overlap)}"
     if first.overlap == 0.0:
