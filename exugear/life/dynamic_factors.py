@@ -26,7 +26,6 @@ from exugear.results.folder import modes_path, run_directory
 from exugear.results.run_file import FINAL_NAME, read_run
 from exugear.steady.mean_system.mesh_waves import wave_name
 from exugear.steady.mean_system.planet_sets import PlanetSet, planet_sets
-from exugear.steady.steady_file import load_response, settings_of
 from exugear.system.system import Assembly, input_hash
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.display import ReprMixin
@@ -189,6 +188,8 @@ def source_hash(assembly: Assembly, rating: RatingSection, folder: Path) -> str:
     if rating.dynamic_factor_run is not None:
         return input_hash(assembly, rating.dynamic_factor_run)
     if rating.dynamic_factor_steady is not None:
+        from exugear.steady.steady_file import load_response  # the solvers of the response, not for checks
+
         with suppress(FileError):
             return str(load_response(response_path(folder, assembly, rating)).attrs["input_hash"])
     return ""
@@ -218,6 +219,8 @@ def factors_of_response(assembly: Assembly, rating: RatingSection, path: Path, b
     GearboxFileError
         The response is missing or has another input.
     """
+    from exugear.steady.steady_file import load_response, settings_of
+
     gearbox = assembly.gearbox
     level = rating.dynamic_factor_steady
     key = f"rating.dynamic_factor_steady = {level!r}"

@@ -26,7 +26,6 @@ from exugear.life.load_spectrum.counted import FLANKS, ToothExposure
 from exugear.life.static_balance import ActingLoads, StaticBalance
 from exugear.system.tooth_mesh.tables import TableRequest
 from fe_ste.geometry.gears import Gear, GearPair
-from fe_ste.root_stress import MeshCycleStress, RootGauges, mesh_cycle_stress, root_gauges
 from fe_ste.standards.iso6336 import Hardening, outside_scope
 from fe_ste.standards.pitting import (
     CASE_HARDENED_BENDING,
@@ -57,6 +56,8 @@ from fe_ste.tools.stores import Layout, Store
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from fe_ste.root_stress import MeshCycleStress, RootGauges
 
 RZ_OF_RA = 6.0
 """Rz over Ra (ISO 6336-2)."""
@@ -459,6 +460,8 @@ def pair_stresses(
     begin : called with the name of each pair before it is computed
     keep : whether to store computed stresses
     """
+    from fe_ste.root_stress import MeshCycleStress, mesh_cycle_stress, root_gauges  # finite elements, not for checks
+
     known: dict[tuple[Gear, int], RootGauges] = {}
 
     def gauges(gear: Gear, side: int) -> RootGauges:

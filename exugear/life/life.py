@@ -7,6 +7,7 @@ import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,9 +24,11 @@ from exugear.life.load_spectrum.sources import Progress, section_of
 from exugear.life.static_balance import ActingLoads, AngleStore, StaticBalance, acting_loads, static_balance
 from exugear.system.bearings.rolling.life import LEAST_RATIO
 from exugear.system.system import Assembly, input_hash
-from fe_ste.root_stress import MeshCycleStress
 from fe_ste.standards.iso6336 import outside_scope
 from fe_ste.tools.display import ReprMixin
+
+if TYPE_CHECKING:
+    from fe_ste.root_stress import MeshCycleStress
 
 LEAST_OUTSIDE = 0.01
 """Fraction of the load outside the path of contact below which no relief is recommended."""

@@ -33,7 +33,6 @@ from exugear.life.rating.standard import FlankRules, MeshLoads, rate
 from exugear.life.static_balance import ActingLoads, StaticBalance, acting_loads, static_balance
 from exugear.system.gearbox_checks import lacking, usual_variant
 from exugear.system.system import Assembly
-from fe_ste.root_stress import MeshCycleStress
 from fe_ste.standards.iso6336 import Edition, outside_scope
 from fe_ste.standards.pitting import UNMODIFIED, tangential_force
 from fe_ste.standards.tooth_root import root_stress_factors
@@ -41,6 +40,8 @@ from fe_ste.tools.display import ReprMixin
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from fe_ste.root_stress import MeshCycleStress
 
 OTHER_EDITION: Mapping[Edition, Edition] = {"ISO 6336:2019": "ISO 6336:2006", "ISO 6336:2006": "ISO 6336:2019"}
 """Edition that is compared with the edition of the file."""
