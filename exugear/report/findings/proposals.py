@@ -189,7 +189,7 @@ def _modification_changes(gearbox: Gearbox, name: str, pair: GearPair, deflectio
     both = _gear_names(gearbox, name)
     sections = {gear: gearbox.case.gears[gear].modification or ModificationSection() for gear in both}
     # Half of the path with two tooth pairs in contact; teeth with a contact ratio near 1 or below get a short one.
-    length = 0.5 * max(pair.transverse_contact_ratio - 1.0, 0.1) * pair.transverse_base_pitch / MM
+    length = round(0.5 * max(pair.transverse_contact_ratio - 1.0, 0.1) * pair.transverse_base_pitch / MM, 2)
     amounts = sorted({max(1.0, round(share * deflection / UM)) for share in AMOUNTS})
     for amount in amounts:
         relief: dict[str, Any] = {}
@@ -199,6 +199,8 @@ def _modification_changes(gearbox: Gearbox, name: str, pair: GearPair, deflectio
                 relief[f"{place}.tip_relief_length_mm"] = length
             relief[f"{place}.tip_relief_um"] = section.tip_relief_um + amount
         words = f"{name}: tip relief {amount:g} µm more on both gears"
+        if len(relief) > len(sections):  # a gear without relief gets its length, too
+            words += f", {length:g} mm long"
         yield DesignChange(f"{name}-tip-relief-{amount:g}", words, "modification", relief)
         crowned = sections[both[0]].lead_crowning_um + amount
         words = f"{name}: lead crowning {amount:g} µm more on {both[0]}"
