@@ -17,6 +17,9 @@ PIP := $(RUN)/python -m pip --quiet --quiet --disable-pip-version-check
 # Idle BLAS threads wait actively and slow compiled loops beside them; the command line sets the same.
 export OPENBLAS_NUM_THREADS ?= 1
 
+# Tests start some hundred processes, each of which would compile the modules again: a second or more.
+unexport PYTHONDONTWRITEBYTECODE
+
 # Tests of one file stay together: they share tables and runs.
 SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist loadfile --durations 20
 
