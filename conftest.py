@@ -6,6 +6,7 @@ They read and write none in the user's cache folder.
 import hashlib
 import os
 import shutil
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +42,10 @@ if "PYTEST_XDIST_WORKER" not in os.environ:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Of a test marked `sample` the first set of parameters stays where it is, the others run before a release."""
+    """Of a test marked `sample` the first set of parameters stays where it is, the others run before a release.
+
+    Files with most tests of the mark `validation`, which take long, come first: no core waits at the end for one.
+    """
     seen = set()
     for item in items:
         if item.get_closest_marker("sample") is not None:
@@ -49,6 +53,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             if name in seen:
                 item.add_marker("long")
             seen.add(name)
+    long = Counter(
+        item.path for item in items if item.get_closest_marker("validation") and not item.get_closest_marker("long")
+    )
+    items.sort(key=lambda item: -long[item.path])
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:

@@ -24,7 +24,7 @@ from ..cases.command import exugear
 from ..cases.spur import SPUR_CASE
 
 CHOICE = Choice("bushing", "line_of_action", "assemblies")
-SETTINGS = SteadySettings(SpeedRange.from_text("-10:-35:60"), harmonics=3)
+SETTINGS = SteadySettings(SpeedRange.from_text("-10:-35:60"), harmonics=3, at_resonances=False)
 CHANGES = {"housing.factor": 0.5, "name": "stiff <b>housing</b>"}
 FOLDERS = {"grc": "grc", "stiff": "<img src=x onerror=alert(1)> \x1b[1m [red]", "range": "grc"}
 RANGE = {"operation.speed_range_rpm": [15.0, 20.0]}

@@ -142,8 +142,10 @@ def test_loads_losses_and_rating_run_on_a_new_file(case: Path, command: tuple[st
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize("kind", RUN_IN_EACH_CHANGE)
+@pytest.mark.sample
+@pytest.mark.parametrize("kind", KINDS)
 def test_the_life_of_a_new_file_is_long_enough(kind: str, tmp_path: Path) -> None:
+    """The first kind in each change: the way through the program is the same for all, wind takes four times as long."""
     path = tmp_path / kind / "gearbox.toml"
     assert exugear("new", path, "--kind", kind).exit_code == 0
     outcome = exugear("life", path, "--variant", "bushing", "--mesh-model", "iso6336", "--out", tmp_path / "out")
