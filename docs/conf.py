@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
-from functools import partial
 from importlib.metadata import version as installed_version
 from pathlib import Path
-
-import numpydoc.docscrape_sphinx
-from jinja2 import FileSystemBytecodeCache
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
@@ -18,11 +14,6 @@ sys.path[:0] = [str(ROOT), str(HERE / "tools")]
 import gallery  # noqa: E402  found through the line above
 
 from fe_ste.tools import arrays  # noqa: E402
-
-# numpydoc would compile its template again for each of 6000 docstrings, 2 ms each.
-numpydoc.docscrape_sphinx.SandboxedEnvironment = partial(
-    numpydoc.docscrape_sphinx.SandboxedEnvironment, bytecode_cache=FileSystemBytecodeCache()
-)
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Examples use paths from the root of the project, as the command line does.
