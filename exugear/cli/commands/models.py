@@ -519,7 +519,7 @@ def report(
 
     The page lists the resonances, their amplitudes and causes, and needs no other file. It compares all variants with
     runs and modes. Missing modes of these models are computed first, and a steady-state response over the operating
-    range if there is none. gmsh scripts are not run; their meshes must exist.
+    range if there is none for this input. gmsh scripts are not run; their meshes must exist.
     """
     from exugear.cli.tasks import report as task
 
