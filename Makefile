@@ -143,7 +143,7 @@ test-browser: $(INSTALLED)
 validate: $(INSTALLED)
 	$(RUN)/python -m pytest -m "validation and not long" $(SIDE_BY_SIDE)
 
-# Both of these with one collection of the tests and one set of fixtures: 1.5 minutes less than one after the other.
+# Both of these with one collection of the tests and one set of fixtures for each file.
 test-and-validate: $(INSTALLED)
 	$(RUN)/python -m pytest -m "not browser and not long" $(SIDE_BY_SIDE)
 

@@ -26,9 +26,8 @@ START = "exugear new my/gearbox.toml"
 BLOCK = re.compile(
     r"^( *)```(sh|python)\n(.*?)^\1```$((?:\s*<!-- (?:expect|exit|picture): .*? -->)*)", re.MULTILINE | re.DOTALL
 )
-QUICK = ("editor_in_the_browser", "python", "untrusted_files")
+QUICK = ("catalogue_bearings", "editor_in_the_browser", "python", "untrusted_files")
 LONG = (
-    "catalogue_bearings",
     "damping",
     "drive_with_duty_cycle",
     "external_housing",
