@@ -17,8 +17,6 @@ from fe_ste.transmission_error.compliance import pair_compliance
 from fe_ste.transmission_error.states import StateAxes
 from fe_ste.transmission_error.transmission_error import solve_positions
 
-from ..cases.spur import COARSE_INPUT
-
 BENCHMARKS = Path(__file__).parents[3] / "benchmarks"
 pytestmark = pytest.mark.validation
 
@@ -32,11 +30,9 @@ def defaults():
 
 @pytest.fixture(scope="module")
 def pair(defaults, tmp_path_factory):
-    """Folder with tables on a full grid, of few elements a tooth for all models, and what was found."""
+    """Folder with tables on a full grid, and what was found."""
     folder = tmp_path_factory.mktemp("pair")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
-        yield folder, defaults.compare(defaults.CASES["pair"](), folder)
+    return folder, defaults.compare(defaults.CASES["pair"](), folder)
 
 
 @pytest.mark.parametrize(
