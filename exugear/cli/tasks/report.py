@@ -101,10 +101,12 @@ def report(
 def _changed_since(folder: Path) -> list[Finding]:
     """Return a warning if the gearbox file has changed since the results in its folder were computed."""
     source = stored_source(folder)
+    if source is None or not source.is_file():
+        return []
     try:
-        if source is None or read_toml(source) == read_stored_gearbox(folder).content:
+        if read_toml(source) == read_stored_gearbox(folder).content:
             return []
-    except GearboxFileError:  # moved, being edited, or with files that need permission: nothing can be said
+    except GearboxFileError:  # being edited, or with files that need permission: nothing can be said
         return []
     text = f"{source.name} has changed since these results were computed; for the present one: exugear steady {source}"
     return [Finding("warning", text)]
