@@ -62,9 +62,8 @@ def gears(origin: Origin) -> dict[str, Gear]:
     Raises
     ------
     GearboxFileError
-        A gear cannot be built, or a pair has an unknown gear; the message names its key.
+        A gear cannot be built; the message names its key.
     """
-    part_of_each(partial(_check_names, origin), origin.case.pairs)
     plain = {name: _unchecked(name, section) for name, section in origin.case.gears.items()}
     shifted = {**plain, **part_of_each(partial(_with_shift, origin, plain), _flagged(origin, "shift"))}
     shifted = {name: with_usual_rounding(origin.case.gears[name], gear) for name, gear in shifted.items()}
@@ -82,14 +81,6 @@ def gears(origin: Origin) -> dict[str, Gear]:
         )
 
     return part_of_each(convert_section, origin.case.gears)
-
-
-def _check_names(origin: Origin, name: str, section: PairSection) -> None:
-    """Raise an error if a gear of a pair is unknown, before a gear without a pair is noticed."""
-    for key in ("pinion", "gear"):
-        if getattr(section, key) not in origin.case.gears:
-            known = known_names("gears", origin.case.gears, f"gears.{getattr(section, key)}")
-            raise origin.error(f"pairs.{name}.{key} = {getattr(section, key)!r}: no such gear; {known}")
 
 
 def with_usual_rounding(section: GearSection, gear: GearInputs) -> GearInputs:
@@ -148,11 +139,9 @@ def _with_shift(origin: Origin, gears: Mapping[str, GearInputs], name: str, sect
             raise origin.error(f"{key}: {mate.name} of pairs.{pair_name} has no profile_shift either; set one of them")
         shift = shift_beside(mate, gears[name], pair.centre_distance)
         if shift is None:
-            usual = abs(mate.outward * mate.reference_radius + gears[name].outward * gears[name].reference_radius)
             raise origin.error(
                 f"{key}: at pairs.{pair_name}.centre_distance_mm = {1e3 * pair.centre_distance:g} no line of action "
-                f"touches both base circles; without profile shift {pair.pinion.teeth} and {pair.gear.teeth} teeth of "
-                f"this module and helix angle have {1e3 * usual:.4g} mm; correct the teeth or the centre distance"
+                "touches both base circles; correct it"
             )
         return replace(gears[name], profile_shift=shift)
     raise origin.error(f"{key}: the gear is in no pair whose centre distance defines it; set profile_shift")
@@ -365,10 +354,14 @@ def gear_pairs(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, GearPair]
     Raises
     ------
     GearboxFileError
-        The gears of a pair cannot run together.
+        A pair has an unknown gear, or its gears cannot run together.
     """
 
     def convert_section(name: str, section: PairSection) -> GearPair:
+        for key in ("pinion", "gear"):
+            if getattr(section, key) not in gears:
+                known = known_names("gears", gears, f"gears.{getattr(section, key)}")
+                raise origin.error(f"pairs.{name}.{key} = {getattr(section, key)!r}: no such gear; {known}")
         first = gears[section.pinion]
         second = gears[section.gear]
         # A file may call the larger gear or the ring gear the pinion; gear 1 is then the other gear.

@@ -337,20 +337,7 @@ def bearing_duties(assembly: Assembly) -> tuple[BearingLoadState, ...]:
     points = bearing_points(assembly)
     reactions = reaction_loads(assembly) if any(is_stated(point.bearing) for point in points) else {}
     return tuple(
-        duty_of(
-            point, reactions.get(point.bearing.name) if is_stated(point.bearing) else None, _held_back(point, points)
-        )
-        for point in points
-    )
-
-
-def _held_back(point: OperatingPoint, points: Sequence[OperatingPoint]) -> bool:
-    """Return whether another catalogue bearing holds the same body in the axial direction that this one leaves free."""
-    open_sense = -math.copysign(1.0, point.rows[0].contact_angle)
-    return any(
-        any(open_sense * row.contact_angle > 0.0 for row in other.rows)
-        for other in points
-        if other is not point and (other.bearing.body, other.bearing.on) == (point.bearing.body, point.bearing.on)
+        duty_of(point, reactions.get(point.bearing.name) if is_stated(point.bearing) else None) for point in points
     )
 
 

@@ -45,15 +45,8 @@ WHEEL, LEAST_SEAT, LEAST_OVER_SHAFT = 1.5, 0.98, 0.9
 bore of a mounted gear over the bores of the bearings on both sides, and over the shaft under it in the file."""
 OTHER_SIZE, MOST_WALL = 0.01, 4.0
 """Difference of a diameter from that of the designation, and outer diameter of a bearing over its bore."""
-TILTING = (
-    "deep_groove_ball",
-    "self_aligning_ball",
-    "angular_contact_ball",
-    "four_point_ball",
-    "spherical_roller",
-    "tapered_roller",
-)
-"""Types of bearings of which a single row does not keep a shaft with gears from tilting."""
+TILTING = ("deep_groove_ball", "self_aligning_ball", "angular_contact_ball", "four_point_ball", "spherical_roller")
+"""Types of bearings of which a single row does not keep a shaft from tilting."""
 
 
 def part_warnings(gearbox: Gearbox) -> Iterator[str]:
@@ -287,7 +280,7 @@ def _backlashes(gearbox: Gearbox) -> Iterator[str]:
 
 
 def _shafts_on_one_bearing(gearbox: Gearbox) -> Iterator[str]:
-    """Yield shafts with gears that are supported by only one bearing, of a type that does not keep it from tilting."""
+    """Yield shafts with gears that are supported by only one bearing, of a type that is compliant in tilting."""
     reported = set()
     for body in gearbox.bodies():
         bearings = [bearing for bearing in gearbox.bearings if body.name in (bearing.body, bearing.on)]
@@ -298,7 +291,7 @@ def _shafts_on_one_bearing(gearbox: Gearbox) -> Iterator[str]:
             reported.add(body.family)
             yield (
                 f"bearings.{bearings[0].family}: the only bearing of {body.family}; one "
-                f"{catalogue.type.replace('_', ' ')} bearing does not keep it from tilting; is a bearing missing?"
+                f"{catalogue.type.replace('_', ' ')} bearing has almost no tilting stiffness; is a bearing missing?"
             )
 
 

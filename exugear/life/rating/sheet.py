@@ -334,12 +334,7 @@ def _assumptions(gearbox: Gearbox, rating: RatingSection) -> Iterator[str]:
             yield "nominal_hours of [rating] is missing: teeth are rated for at least 1e10 load cycles"
     elif rating.application_factor != 1.0:
         yield "application_factor is for nominal loads: K_A = 1 under [loads]"
-    if rating.dynamic_factor is not None:
-        yield (
-            f"K_v to method B where both gears have a tolerance_class; dynamic_factor = {rating.dynamic_factor:g} of "
-            "[rating] is that of exugear life, and of gears without tolerance_class"
-        )
-    else:
+    if rating.dynamic_factor is None:
         yield "K_v other than to the standard: minimum_dynamic_factor (runs and responses are not evaluated here)"
 
 

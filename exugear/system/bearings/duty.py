@@ -244,12 +244,11 @@ def _two_designs(section: CatalogueSection, taken: KnownRating) -> str:
     )
 
 
-def duty_of(point: OperatingPoint, reaction: Floats | None = None, held_back: bool = False) -> BearingLoadState:
+def duty_of(point: OperatingPoint, reaction: Floats | None = None) -> BearingLoadState:
     """Find what a bearing bears at its operating point.
 
     Parameters
     ----------
-    held_back : whether another bearing holds the body in the axial direction that this one leaves free
     reaction : (6,) for a bearing whose load the file states: what the statics find, N and N m
     """
     bearing = point.bearing
@@ -286,7 +285,7 @@ def duty_of(point: OperatingPoint, reaction: Floats | None = None, held_back: bo
             inner_ring_turns_against_load=not bearing.carries_outer_ring,
         ),
         reaction=None if reaction is None else math.hypot(reaction[0], reaction[1]),
-        remarks=tuple(_remarks(point, ratings, reaction, held_back)),
+        remarks=tuple(_remarks(point, ratings, reaction)),
     )
 
 
@@ -306,7 +305,7 @@ def _largest_load(state: BearingState) -> float:
     return max(float(state.element_load[begin:end].max()) for row, begin, end in of_rows if not is_rib(row))
 
 
-def _remarks(point: OperatingPoint, ratings: LoadRatings, reaction: Floats | None, held_back: bool) -> list[str]:
+def _remarks(point: OperatingPoint, ratings: LoadRatings, reaction: Floats | None) -> list[str]:
     section = point.bearing.catalogue
     rows = point.rows
     assert section is not None
@@ -324,7 +323,7 @@ def _remarks(point: OperatingPoint, ratings: LoadRatings, reaction: Floats | Non
                 f"radial_load_kN = {1e-3 * point.radial_load:.4g} is specified; the static load results in "
                 f"{1e-3 * found:.4g}"
             )
-    if holds_one_way(rows) and not held_back:
+    if holds_one_way(rows):
         sense = "+z" if rows[0].contact_angle > 0.0 else "-z"
         remarks.append(f"locates its inner ring axially in one direction only, against a load towards {sense}")
     static = equivalent_static_load(rows, section.type, point.radial_load, abs(float(point.load[2])))

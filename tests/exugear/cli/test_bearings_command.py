@@ -75,7 +75,7 @@ def test_check_tells_load_and_range_of_what_is_estimated_and_writes_nothing(case
     with_little, with_much = ball["estimated"]["radial_clearance_mm"]["radial_stiffness_N_per_m"]
     assert with_little == pytest.approx(ball["radial_stiffness_N_per_m"])  # none is what is taken
     assert with_much < with_little
-    assert not any("in one direction only" in w for w in summary["warnings"])  # the tapered bearings face each other
+    assert any("taper_1: locates its inner ring axially in one direction only" in w for w in summary["warnings"])
     assert [path.name for path in case.parent.iterdir()] == [case.name]
 
 

@@ -43,15 +43,6 @@ def without_a_bearing(content: dict[str, Any]) -> None:
     del content["bearings"]["output_right"]
 
 
-def with_one_tapered_bearing(content: dict[str, Any]) -> None:
-    without_a_bearing(content)
-    content["bearings"]["output_left"] = {
-        "body": "output",
-        "z_mm": content["bearings"]["output_left"]["z_mm"],
-        "catalogue": {"designation": "32008", "contact_angle_deg": 14.0},
-    }
-
-
 def further_apart(content: dict[str, Any]) -> None:
     content["pairs"]["helical"]["centre_distance_mm"] = 129.0
     content["bodies"]["output"]["axis_position_mm"] = [129.0, 0.0]
@@ -102,11 +93,6 @@ MISTAKES: dict[str, tuple[str, Callable[[dict[str, Any]], None], str]] = {
         "bodies.output.inertia.discs.axial_kg_m2 = 33100: with 10.5 kg the radius of gyration is 5.61e",
     ),
     "one bearing": ("pair", without_a_bearing, "bearings.output_left: the only bearing of output"),
-    "one tapered bearing": (
-        "pair",
-        with_one_tapered_bearing,
-        "one tapered roller bearing does not keep it from tilting",
-    ),
     "centre distance": ("pair", further_apart, "pairs.helical.centre_distance_mm = 129: backlash is 926 µm, about"),
     "profile shift": (
         "pair",
