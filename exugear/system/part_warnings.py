@@ -45,8 +45,8 @@ WHEEL, LEAST_SEAT, LEAST_OVER_SHAFT = 1.5, 0.98, 0.9
 bore of a mounted gear over the bores of the bearings on both sides, and over the shaft under it in the file."""
 OTHER_SIZE, MOST_WALL = 0.01, 4.0
 """Difference of a diameter from that of the designation, and outer diameter of a bearing over its bore."""
-TILTING = ("deep_groove_ball", "self_aligning_ball", "angular_contact_ball", "four_point_ball", "spherical_roller")
-"""Types of bearings of which a single row does not keep a shaft from tilting."""
+SELF_ALIGNING = ("self_aligning_ball", "spherical_roller", "thrust_spherical_roller")
+"""Types of bearings that do not resist tilting with any number of rows; of the others, a single row barely does."""
 
 
 def part_warnings(gearbox: Gearbox) -> Iterator[str]:
@@ -57,7 +57,7 @@ def part_warnings(gearbox: Gearbox) -> Iterator[str]:
     yield from _bearings(gearbox)
     yield from _faces(gearbox)
     yield from _backlashes(gearbox)
-    yield from _shafts_on_one_bearing(gearbox)
+    yield from shafts_on_one_bearing(gearbox)
     yield from _faces_in_bearings(gearbox)
     yield from _speed_limits(gearbox)
 
@@ -279,19 +279,22 @@ def _backlashes(gearbox: Gearbox) -> Iterator[str]:
             )
 
 
-def _shafts_on_one_bearing(gearbox: Gearbox) -> Iterator[str]:
-    """Yield shafts with gears that are supported by only one bearing, of a type that is compliant in tilting."""
+def shafts_on_one_bearing(gearbox: Gearbox) -> Iterator[str]:
+    """Yield shafts with gears that are supported by only one bearing, which barely resists tilting."""
     reported = set()
     for body in gearbox.bodies():
         bearings = [bearing for bearing in gearbox.bearings if body.name in (bearing.body, bearing.on)]
         if len(bearings) != 1 or body.fixed or body.planet_of is not None or body.family in reported or not body.wheels:
             continue
         catalogue = bearings[0].catalogue
-        if catalogue is not None and catalogue.type in TILTING and catalogue.arrangement == "single":
+        if catalogue is None or catalogue.arrangement != "single":
+            continue
+        if (catalogue.row_count or 1) == 1 or catalogue.type in SELF_ALIGNING:
             reported.add(body.family)
             yield (
-                f"bearings.{bearings[0].family}: the only bearing of {body.family}; one "
-                f"{catalogue.type.replace('_', ' ')} bearing has almost no tilting stiffness; is a bearing missing?"
+                f"bodies.{body.family}: supported by one bearing ({bearings[0].family}) only, and one "
+                f"{catalogue.type.replace('_', ' ')} bearing barely resists tilting; add a second [bearings.NAME], or "
+                "set rows that resist tilting (arrangement or row_count)"
             )
 
 
