@@ -279,18 +279,24 @@ def one_of(expected: str, value: Any) -> str:
     return f"must be {expected}"
 
 
-def known_names(kind: str, names: Iterable[str], table: str) -> str:
-    """Return which names a file has, or which table to add if it has none.
+def known_names(kind: str, names: Iterable[str], table: str, wanted: str = "") -> str:
+    """Return which names a file has, or which table to add if it has none; suggest the one most similar to `wanted`.
 
     Examples
     --------
     >>> known_names("gears", ["sun", "ring"], "gears.NAME")
     'gears are sun, ring'
+    >>> known_names("gears", ["sun", "ring"], "gears.rign", "rign")
+    "did you mean 'ring'? gears are sun, ring"
     >>> known_names("pairs", [], "pairs.p")
     'the file has no pairs; add [pairs.p]'
     """
-    listed = ", ".join(names)
-    return f"{kind} are {listed}" if listed else f"the file has no {kind}; add [{table}]"
+    known = list(names)
+    if not known:
+        return f"the file has no {kind}; add [{table}]"
+    near = difflib.get_close_matches(wanted[:100], known, n=1)
+    hint = f"did you mean {near[0]!r}? " if near else ""
+    return f"{hint}{kind} are {', '.join(known)}"
 
 
 def _path(location: tuple[int | str, ...], content: Any) -> tuple[int | str, ...]:
@@ -407,7 +413,7 @@ class Origin(ReprMixin):
         """Return whether all bodies are enabled; an unknown name raises an error, a disabled body does not."""
         for name in names:
             if name != GROUND and name not in self.case.bodies:
-                known = known_names("bodies", [*self.case.bodies, GROUND], "bodies.NAME")
+                known = known_names("bodies", [*self.case.bodies, GROUND], "bodies.NAME", name)
                 raise self.error(f"{key}: no body {name!r}; {known}")
         return all(name == GROUND or name in self.enabled for name in names)
 

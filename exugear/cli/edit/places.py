@@ -97,7 +97,7 @@ _AT_LINE = re.compile(r"\(at line (\d+), column \d+\)")
 _KEY_FIRST = re.compile(r"([A-Za-z0-9_-]+(?:\.[A-Za-z0-9_-]+)*)(?= = |: |:$)")
 _ANY_KEY = re.compile(r"[A-Za-z0-9_-]+(?:\.[A-Za-z0-9_-]+)+")
 _MEANT = re.compile(r"did you mean '([^']+)'\?")
-_VALUE = re.compile(r" = '([^']*)': did you mean")
+_VALUE = re.compile(r" = '([^']*)': (?:no such [a-z ]+; )?did you mean")
 _RENAMED = re.compile(r"was renamed to (?:[\w.]*\.)?(\w+);")
 
 
