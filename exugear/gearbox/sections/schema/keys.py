@@ -9,7 +9,7 @@ from __future__ import annotations
 import ast
 import inspect
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -70,13 +70,38 @@ def tables() -> dict[str, type[BaseModel]]:
 
 def keys() -> Iterator[Key]:
     """All keys, table by table; keys that hold a table are omitted because the table is listed."""
-    examples = tomllib.loads(files(__package__).joinpath("examples.toml").read_text(encoding="utf-8"))
+    examples = _examples()
     for table, model in tables().items():
         texts = meanings(model)
         given = _example_of_table(examples, table)
         for name, field in model.model_fields.items():
             if not _model_within(field.annotation):
                 yield _key(table, name, field, texts[name], given[name])
+
+
+def example_at(path: Sequence[int | str]) -> str:
+    """Return a key or an inline table at a path of a gearbox file with a possible value; empty for none.
+
+    Examples
+    --------
+    >>> example_at(["gears", "sun", "teeth"]), example_at(["gears", "sun", "toothing"])
+    ('teeth = 21', '')
+    >>> example_at(["static_load"])
+    'static_load = { torques_N_m = { carrier = 240000.0 }, locked = ["hss"] }'
+    """
+    found: Any = _examples()
+    for part in path:
+        if isinstance(found, list):
+            found = found[0]
+        elif isinstance(found, Mapping) and (part in found or "NAME" in found):
+            found = found.get(part, found.get("NAME"))
+        else:
+            return ""
+    return f"{path[-1]} = {written(found)}"
+
+
+def _examples() -> dict[str, Any]:
+    return tomllib.loads(files(__package__).joinpath("examples.toml").read_text(encoding="utf-8"))
 
 
 @cache
