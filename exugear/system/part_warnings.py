@@ -54,6 +54,7 @@ def part_warnings(gearbox: Gearbox) -> Iterator[str]:
     yield from _masses(gearbox)
     yield from _bores(gearbox)
     yield from _seats(gearbox)
+    yield from _seats_beyond_shapes(gearbox)
     yield from _bearings(gearbox)
     yield from _faces(gearbox)
     yield from _backlashes(gearbox)
@@ -206,6 +207,28 @@ def _shaft_under(gearbox: Gearbox, body: Body, gear: Gear, place: float) -> floa
             found.append(MM * min(piece.outer_diameter_mm, piece.outer_diameter_end_mm or piece.outer_diameter_mm))
         start = end
     return min(found, default=None)
+
+
+def _seats_beyond_shapes(gearbox: Gearbox) -> Iterator[str]:
+    """Yield bearings and gears whose middle is beyond the shape of their body, which then lacks mass and stiffness."""
+    bodies = gearbox.named_bodies
+    for family, section in gearbox.case.bodies.items():
+        if section.shape is None:
+            continue
+        start = si(section.shape, "start_z_mm")
+        end = start + sum(si(piece, "length_mm") for piece in section.shape.sections)
+        places = {
+            f"bearings.{bearing.family}.z_mm": bearing.position[2]
+            for bearing in gearbox.bearings
+            if bodies[bearing.body].family == family
+        }
+        places |= {f"bodies.{family}.gears_z_mm.{gear}": MM * z_mm for gear, z_mm in section.gears_z_mm.items()}
+        for key, place in places.items():
+            if not start - LEAST_CLASH < place < end + LEAST_CLASH:
+                yield (
+                    f"{key} = {1e3 * place:g}: beyond the shape of {family}, which extends from {1e3 * start:g} to "
+                    f"{1e3 * end:g} mm; correct the position, or the sections of bodies.{family}.shape"
+                )
 
 
 def _bearings(gearbox: Gearbox) -> Iterator[str]:

@@ -167,6 +167,26 @@ def test_imports_raise_no_alarm(path: Path) -> None:
     assert list(part_warnings(gearbox)) == []
 
 
+def test_seats_beyond_the_shape_of_their_shaft_are_named_with_both_positions() -> None:
+    """The high-speed shaft of the GRC cut off after 100 mm, and one of its bearings before its start."""
+    path = ROOT / "cases/grc750/gearbox.toml"
+    content = tomllib.loads(path.read_text("utf-8"))
+    shape = content["bodies"]["hss"]["shape"]
+    shape["sections"] = [{**shape["sections"][0], "length_mm": 100.0}]
+    start, end = shape["start_z_mm"], shape["start_z_mm"] + 100.0
+    content["bearings"]["hss_a"]["z_mm"] = start - 500.0
+    gear_z = content["bodies"]["hss"]["gears_z_mm"]["hs_pinion"]
+    bearing_z = content["bearings"]["hss_bc"]["z_mm"]
+    assert min(gear_z, bearing_z) > end
+    found = [line for line in part_warnings(Gearbox.from_dict(content, str(path))) if "beyond the shape of hss" in line]
+    assert [line.partition(":")[0] for line in found] == [
+        f"bearings.hss_a.z_mm = {start - 500.0:g}",
+        f"bearings.hss_bc.z_mm = {bearing_z:g}",
+        f"bodies.hss.gears_z_mm.hs_pinion = {gear_z:g}",
+    ]
+    assert all(f"which extends from {start:g} to {end:g} mm" in line for line in found)
+
+
 ONE_BEARING = "bodies.output: supported by one bearing (output_left) only"
 
 
