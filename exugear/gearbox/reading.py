@@ -19,7 +19,7 @@ from exugear.gearbox.renames import GEARBOX_RENAMES, new_name, renamed_hint
 from exugear.gearbox.sections.bodies import BodySection
 from exugear.gearbox.sections.case import GearboxFile
 from exugear.gearbox.sections.entries import GROUND
-from exugear.gearbox.sections.schema.keys import example_at
+from exugear.gearbox.sections.examples import example_at
 from fe_ste.geometry.checks import GeometryError
 from fe_ste.tools.display import ReprMixin
 
