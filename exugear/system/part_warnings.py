@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from exugear.gearbox.gear_parts import thinning_range
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import operating_range, summarise_loads
-from exugear.gearbox.parts import Bearing, Body, PairSpec
+from exugear.gearbox.parts import Bearing, Body, PairSpec, connector_matrix
 from exugear.gearbox.sections.designations import boundary_of
 from exugear.gearbox.units import MM, RPM, si
 from exugear.system.bodies.seated_items import seat_width
@@ -311,6 +311,8 @@ def shafts_on_one_bearing(gearbox: Gearbox) -> Iterator[str]:
             continue
         catalogue = bearings[0].catalogue
         if catalogue is None or catalogue.arrangement != "single":
+            continue
+        if connector_matrix(bearings[0].stiffness)[3, 3] > 0.0:
             continue
         if (catalogue.row_count or 1) == 1 or catalogue.type in SELF_ALIGNING:
             reported.add(body.family)

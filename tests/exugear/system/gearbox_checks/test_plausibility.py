@@ -208,11 +208,13 @@ def test_a_shaft_on_one_bearing_is_named_unless_its_rows_resist_tilting(catalogu
     assert any(line.startswith(ONE_BEARING) for line in part_warnings(Gearbox.from_dict(content))) == named
 
 
-def test_a_shaft_on_one_bearing_with_stated_tilting_stiffness_is_not_named() -> None:
+@pytest.mark.parametrize("has_catalogue", [False, True])
+def test_a_shaft_on_one_bearing_with_stated_tilting_stiffness_is_not_named(has_catalogue: bool) -> None:
     content = template("pair")
     without_a_bearing(content)
+    if not has_catalogue:
+        content["bearings"]["output_left"].pop("catalogue")
     stiff = {"radial_N_per_m": 5e8, "axial_N_per_m": 5e8, "tilt_N_m_per_rad": 1e6}
-    content["bearings"]["output_left"].pop("catalogue")
     content["bearings"]["output_left"]["stiffness"] = stiff
     assert not [line for line in part_warnings(Gearbox.from_dict(content)) if line.startswith("bodies.output")]
 
