@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -195,17 +195,28 @@ def bearing_findings(remarks: Mapping[str, Sequence[str]]) -> list[Finding]:
     >>> bearing_findings({"left": ["low load"], "right": ["low load"]})
     [Finding(level='warning', text='bearings left, right: low load', value=None)]
     """
-    found: dict[str, list[str]] = {}
-    for bearing, own in remarks.items():
-        for remark in own:
-            found.setdefault(remark, []).append(bearing)
     return [
         Finding(
             "note" if remark.startswith("ratings") else "warning",
             f"bearing{'s' * (len(names) > 1)} {', '.join(names)}: {remark}",
         )
-        for remark, names in found.items()
+        for remark, names in bearings_of_remarks(remarks.items()).items()
     ]
+
+
+def bearings_of_remarks(remarks: Iterable[tuple[str, Sequence[str]]]) -> dict[str, list[str]]:
+    """Return the bearings that each remark is on, from pairs of a bearing and its remarks.
+
+    Examples
+    --------
+    >>> bearings_of_remarks([("left", ["low load"]), ("right", ["low load"]), ("left", ["low load"])])
+    {'low load': ['left', 'right']}
+    """
+    found: dict[str, dict[str, None]] = {}
+    for bearing, own in remarks:
+        for remark in own:
+            found.setdefault(remark, {})[bearing] = None
+    return {remark: list(names) for remark, names in found.items()}
 
 
 def print_table(table: Table) -> None:

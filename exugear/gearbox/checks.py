@@ -64,10 +64,19 @@ def errors_of_bodies(case: GearboxFile) -> Iterator[str]:
             families[name] = family
         for gear in section.gears_z_mm:
             if gear not in case.gears:
-                known = known_names("gears", case.gears, f"gears.{gear}")
+                known = known_names("gears", case.gears, f"gears.{gear}", gear)
                 yield f"bodies.{family}.gears_z_mm.{gear}: no such gear; {known}"
         if section.enabled and section.carrier is not None:
             yield from _errors_of_carrier(case, f"bodies.{family}.carrier = {section.carrier!r}", section.carrier)
+
+
+def errors_of_pairs(case: GearboxFile) -> Iterator[str]:
+    """Yield errors for unknown gears of pairs."""
+    for name, section in case.pairs.items():
+        for key, gear in (("pinion", section.pinion), ("gear", section.gear)):
+            if gear not in case.gears:
+                known = known_names("gears", case.gears, f"gears.{gear}", gear)
+                yield f"pairs.{name}.{key} = {gear!r}: no such gear; {known}"
 
 
 def errors_of_blanks(case: GearboxFile) -> Iterator[str]:
@@ -147,7 +156,7 @@ def errors_of_output_gear(
             )
         return
     if overall.output_gear not in gears:
-        listed = known_names("gears", gears, f"gears.{overall.output_gear}")
+        listed = known_names("gears", gears, f"gears.{overall.output_gear}", overall.output_gear)
         yield f"overall.output_gear = {overall.output_gear!r}: no such gear; {listed}"
         return
     # Names of the body and of all bodies that couplings connect to it; they rotate at one speed.
@@ -411,10 +420,10 @@ def errors_of_measurements(case: GearboxFile, named_bodies: Mapping[str, Body]) 
         key = f"measurements.{name}"
         for kind, source in (("tacho", measurement.tacho), ("speed", measurement.speed)):
             if source is not None and source.shaft not in turning:
-                known = known_names("shafts", turning, "bodies.NAME")
+                known = known_names("shafts", turning, "bodies.NAME", source.shaft)
                 yield f"{key}.{kind}.shaft = {source.shaft!r}: no such shaft; {known}"
         if measurement.load_case is not None and measurement.load_case not in case.load_cases:
-            known = known_names("load cases", case.load_cases, "load_cases.NAME")
+            known = known_names("load cases", case.load_cases, "load_cases.NAME", measurement.load_case)
             yield f"{key}.load_case = {measurement.load_case!r}: no such load case; {known}"
         units = [("speed", "speed", measurement.speed.unit)] if measurement.speed is not None else []
         units += [(f"channels.{own}", section.quantity, section.unit) for own, section in measurement.channels.items()]
@@ -426,7 +435,7 @@ def errors_of_measurements(case: GearboxFile, named_bodies: Mapping[str, Body]) 
                 yield f"{key}.{place}.unit = {text!r}: {what}; set a unit of {quantity}, such as {examples}"
         for channel, section in measurement.channels.items():
             if section.place is not None and section.place not in places:
-                known = known_names("bearings and mounts", places, "bearings.NAME")
+                known = known_names("bearings and mounts", places, "bearings.NAME", section.place)
                 yield f"{key}.channels.{channel}.place = {section.place!r}: no such place; {known}"
 
 
@@ -508,7 +517,8 @@ class Check(NamedTuple):
 CHECKS = (
     Check("names of bodies", errors_of_bodies),
     Check("masses", errors_of_mass_properties),
-    Check("gears"),
+    Check("names of pairs", errors_of_pairs),
+    Check("gears", None, ("names of pairs",)),
     Check("file_stiffness"),
     Check("supports", errors_of_supports),
     Check("inertia sets", errors_of_inertia_sets, ("names of bodies", "masses")),
@@ -541,5 +551,14 @@ CHECKS = (
     Check("varying_loads", errors_of_excitations, ("train", "names")),
 )
 """Checks in the order in which they are run."""
-ALONE = ("names of bodies", "masses", "gears", "file_stiffness", "supports", "modifications", "gear_pairs")
+ALONE = (
+    "names of bodies",
+    "masses",
+    "names of pairs",
+    "gears",
+    "file_stiffness",
+    "supports",
+    "modifications",
+    "gear_pairs",
+)
 """Checks that remain meaningful if other entries of the file cannot be read."""

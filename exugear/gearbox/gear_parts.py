@@ -139,12 +139,22 @@ def _with_shift(origin: Origin, gears: Mapping[str, GearInputs], name: str, sect
             raise origin.error(f"{key}: {mate.name} of pairs.{pair_name} has no profile_shift either; set one of them")
         shift = shift_beside(mate, gears[name], pair.centre_distance)
         if shift is None:
-            raise origin.error(
-                f"{key}: at pairs.{pair_name}.centre_distance_mm = {1e3 * pair.centre_distance:g} no line of action "
-                "touches both base circles; correct it"
-            )
+            raise origin.error(_no_line_of_action(pair))
         return replace(gears[name], profile_shift=shift)
     raise origin.error(f"{key}: the gear is in no pair whose centre distance defines it; set profile_shift")
+
+
+def _no_line_of_action(pair: UncheckedPair) -> str:
+    """Say that the base circles of a pair are too large for its centre distance, with the numbers that decide it."""
+    pinion, gear = pair.pinion, pair.gear
+    reference = 0.5 * abs(pinion.teeth + (-gear.teeth if gear.internal else gear.teeth)) * gear.transverse_module
+    base = reference * math.cos(gear.transverse_pressure_angle)
+    return (
+        f"pairs.{pair.name}.centre_distance_mm = {1e3 * pair.centre_distance:g}: no line of action touches both base "
+        f"circles below {1e3 * base:.4g} mm; the reference centre distance is {1e3 * reference:.5g} mm ({pinion.teeth} "
+        f"and {gear.teeth} teeth, module {1e3 * gear.normal_module:g} mm, helix angle "
+        f"{abs(math.degrees(gear.helix_angle)):g} deg); check them"
+    )
 
 
 LEAST_PLAY = 1e-12
@@ -354,14 +364,10 @@ def gear_pairs(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, GearPair]
     Raises
     ------
     GearboxFileError
-        A pair has an unknown gear, or its gears cannot run together.
+        The gears of a pair cannot run together.
     """
 
     def convert_section(name: str, section: PairSection) -> GearPair:
-        for key in ("pinion", "gear"):
-            if getattr(section, key) not in gears:
-                known = known_names("gears", gears, f"gears.{getattr(section, key)}")
-                raise origin.error(f"pairs.{name}.{key} = {getattr(section, key)!r}: no such gear; {known}")
         first = gears[section.pinion]
         second = gears[section.gear]
         # A file may call the larger gear or the ring gear the pinion; gear 1 is then the other gear.
@@ -470,7 +476,7 @@ def meshes(origin: Origin, pairs: Mapping[str, GearPair], bodies: Mapping[str, B
         if not origin.are_enabled(key, section.pinion_body, section.gear_body):
             return ()
         if section.pair not in pairs:
-            known = known_names("pairs", pairs, f"pairs.{section.pair}")
+            known = known_names("pairs", pairs, f"pairs.{section.pair}", section.pair)
             raise origin.error(f"{key}.pair = {section.pair!r}: no such pair; {known}")
         return tuple(_meshes_of_section(origin, name, section, pairs[section.pair], bodies))
 

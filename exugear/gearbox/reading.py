@@ -19,6 +19,7 @@ from exugear.gearbox.renames import GEARBOX_RENAMES, new_name, renamed_hint
 from exugear.gearbox.sections.bodies import BodySection
 from exugear.gearbox.sections.case import GearboxFile
 from exugear.gearbox.sections.entries import GROUND
+from exugear.gearbox.sections.examples import example_at
 from fe_ste.geometry.checks import GeometryError
 from fe_ste.tools.display import ReprMixin
 
@@ -67,7 +68,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         The file is not a regular file, is empty or too large, or is not TOML (with line and column).
     """
     text = read_text(path).replace("\r\n", "\n").replace("\r", "\n")
-    return parsed(lambda: tomllib.loads(text), str(path), "TOML")
+    return parsed_toml(text, str(path))
 
 
 def read_text(path: str | Path) -> str:
@@ -92,6 +93,50 @@ def read_text(path: str | Path) -> str:
     if not text.strip():
         raise GearboxFileError(f"{path}: the file is empty; expected sections such as [gears.sun]")
     return text
+
+
+_AT_LINE = re.compile(r"at line (\d+)")
+_DECIMAL_COMMA = re.compile(r"=\s*([-+]?\d+),(\d+)\s*(?=[#,}]|$)")
+_BARE_TEXT = re.compile(r"=\s*([A-Za-z_][\w.-]*)\s*(?=[#,}]|$)")
+
+
+def parsed_toml(text: str, source: str) -> dict[str, Any]:
+    """Content of a TOML text; an error quotes its line, with the remedy of a decimal comma or of text without quotes.
+
+    Raises
+    ------
+    GearboxFileError
+        The text is not TOML.
+
+    Examples
+    --------
+    >>> parsed_toml("held_diameter_mm = 36,0", "x.toml")
+    Traceback (most recent call last):
+    ...
+    exugear.gearbox.reading.GearboxFileError: x.toml: ... 'held_diameter_mm = 36,0'; ... decimal point: write 36.0
+    """
+
+    def parse() -> dict[str, Any]:
+        try:
+            return tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            place = _AT_LINE.search(str(error))
+            if place is None:
+                raise
+            line = text.split("\n")[int(place[1]) - 1].strip()
+            raise ValueError(f"{error}: {shortened(line)}{_remedy_of_line(line)}") from None
+
+    return parsed(parse, source, "TOML")
+
+
+def _remedy_of_line(line: str) -> str:
+    """Return the remedy of a line of TOML with a decimal comma or with text without quotes; empty for others."""
+    if comma := _DECIMAL_COMMA.search(line):
+        return f"; numbers have a decimal point: write {comma[1]}.{comma[2]}"
+    if (bare := _BARE_TEXT.search(line)) and bare[1] not in ("true", "false", "inf", "nan"):
+        meant = bare[1].lower()
+        return f"; write {meant}" if meant in ("true", "false") else f'; text needs quotes: "{bare[1]}"'
+    return ""
 
 
 def parsed(parse: Callable[[], dict[str, Any]], source: str, form: str) -> dict[str, Any]:
@@ -129,7 +174,7 @@ def parse_case(content: dict[str, Any], source: str) -> GearboxFile:
     Traceback (most recent call last):
     ...
     exugear.gearbox.reading.GearboxFileError: x.toml: name = 3: must be text in quotes
-    x.toml: default_inertias: this key is missing
+    x.toml: default_inertias: this key is missing; for example default_inertias = "assemblies"
     ...
     """
     try:
@@ -218,7 +263,8 @@ def _described(errors: list[Any], content: dict[str, Any]) -> Iterator[str]:
             continue  # the array is too short only because its entries are invalid
         if error["type"] == "missing":
             if path not in meant:
-                yield f"{key}: this key is missing"
+                example = example_at(path)
+                yield f"{key}: this key is missing{f'; for example {example}' if example else ''}"
             continue
         shown = "" if isinstance(error["input"], Mapping) else f" = {shortened(error['input'])}"
         if error["loc"][-1:] == ("[key]",):
@@ -279,18 +325,24 @@ def one_of(expected: str, value: Any) -> str:
     return f"must be {expected}"
 
 
-def known_names(kind: str, names: Iterable[str], table: str) -> str:
-    """Return which names a file has, or which table to add if it has none.
+def known_names(kind: str, names: Iterable[str], table: str, wanted: str = "") -> str:
+    """Return which names a file has, or which table to add if it has none; suggest the one most similar to `wanted`.
 
     Examples
     --------
     >>> known_names("gears", ["sun", "ring"], "gears.NAME")
     'gears are sun, ring'
+    >>> known_names("gears", ["sun", "ring"], "gears.rign", "rign")
+    "did you mean 'ring'? gears are sun, ring"
     >>> known_names("pairs", [], "pairs.p")
     'the file has no pairs; add [pairs.p]'
     """
-    listed = ", ".join(names)
-    return f"{kind} are {listed}" if listed else f"the file has no {kind}; add [{table}]"
+    known = list(names)
+    if not known:
+        return f"the file has no {kind}; add [{table}]"
+    near = difflib.get_close_matches(wanted[:100], known, n=1)
+    hint = f"did you mean {near[0]!r}? " if near else ""
+    return f"{hint}{kind} are {', '.join(known)}"
 
 
 def _path(location: tuple[int | str, ...], content: Any) -> tuple[int | str, ...]:
@@ -407,7 +459,7 @@ class Origin(ReprMixin):
         """Return whether all bodies are enabled; an unknown name raises an error, a disabled body does not."""
         for name in names:
             if name != GROUND and name not in self.case.bodies:
-                known = known_names("bodies", [*self.case.bodies, GROUND], "bodies.NAME")
+                known = known_names("bodies", [*self.case.bodies, GROUND], "bodies.NAME", name)
                 raise self.error(f"{key}: no body {name!r}; {known}")
         return all(name == GROUND or name in self.enabled for name in names)
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import difflib
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, AllowInfNan, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from exugear.gearbox.reading import error_line, one_of, parsed, shortened
+from exugear.gearbox.reading import error_line, one_of, parsed_toml, shortened
 from exugear.gearbox.renames import STUDY_RENAMES, renamed_hint
 from exugear.gearbox.sections.entries import Name, Text
 from exugear.gearbox.variant import Variant
@@ -334,7 +333,7 @@ def read_study_file(path: Path) -> StudyFile:
     except FileError as error:
         raise StudyError(str(error)) from None
     try:
-        content = parsed(lambda: tomllib.loads(text.removeprefix("\ufeff")), str(path), "TOML")
+        content = parsed_toml(text.removeprefix("\ufeff"), str(path))
     except ValueError as error:
         raise StudyError(str(error)) from None
     return parse_study(content, str(path))

@@ -20,12 +20,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Bearing, Body
 from exugear.gearbox.units import optional_si, si
 from exugear.system.bearings.duty import BearingLoadState, OperatingPoint, duty_of, operating_point
 from exugear.system.bearings.rolling.catalogue import catalogue_rows
 from exugear.system.bearings.rolling.contact import bearing_load, equilibrium, row_contacts
-from exugear.system.bearings.rolling.rows import BearingOfRows
+from exugear.system.bearings.rolling.rows import BallRow, BearingOfRows
 from exugear.system.bearings.stiffness import (
     PlanetSupports,
     SupportLaw,
@@ -46,6 +47,7 @@ from exugear.system.bearings.stiffness import (
 from exugear.system.kernels.connectors import ConnectorArrays
 from exugear.system.kernels.coordinates import BODY_SIZE, TILT
 from exugear.system.kernels.meshes import FORCE
+from exugear.system.part_warnings import shafts_on_one_bearing
 from exugear.system.statics import BalanceError, locked_equilibrium, rolled_coordinates, static_state
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.contact_state import MeshLoadState, MeshPlace, static_contacts, with_contact
@@ -172,7 +174,9 @@ def _balance(
     try:
         return locked_equilibrium(assembly, load.torques_N_m, assembly.gearbox.locked, meshes, about, near=near)
     except BalanceError as error:
-        raise BalanceError(f"{error}; {_what_holds_one_way(laws, assembly.connector_names)}") from None
+        unsupported = "; ".join(shafts_on_one_bearing(assembly.gearbox))
+        hint = unsupported or _what_holds_one_way(laws, assembly.connector_names)
+        raise BalanceError(f"{error}; {hint}") from None
 
 
 def _law_at_rest(support: Bearing, of_rows: Floats, direction: float, damping_time: float) -> SupportLaw:
@@ -336,9 +340,45 @@ def bearing_duties(assembly: Assembly) -> tuple[BearingLoadState, ...]:
     """
     points = bearing_points(assembly)
     reactions = reaction_loads(assembly) if any(is_stated(point.bearing) for point in points) else {}
+    opposed = opposed_bearings(assembly.gearbox)
     return tuple(
-        duty_of(point, reactions.get(point.bearing.name) if is_stated(point.bearing) else None) for point in points
+        duty_of(
+            point,
+            reactions.get(point.bearing.name) if is_stated(point.bearing) else None,
+            is_opposed=point.bearing.name in opposed,
+        )
+        for point in points
     )
+
+
+def opposed_bearings(gearbox: Gearbox) -> tuple[str, ...]:
+    """Return the bearings that locate in one axial direction, and whose body another one locates in the opposite one.
+
+    Single tapered or angular contact bearings in X or O arrangement are opposed to each other.
+
+    Examples
+    --------
+    >>> opposed_bearings(Gearbox.from_toml("cases/grc750/gearbox.toml"))
+    ()
+    """
+    found = []
+    for bearing in gearbox.bearings:
+        seats = (bearing.body, bearing.on, bearing.carries_outer_ring)
+        located = _located_directions(bearing)
+        beside = [one for one in gearbox.bearings if (one.body, one.on, one.carries_outer_ring) == seats]
+        if len(located) == 1 and any(_located_directions(one) - located for one in beside):
+            found.append(bearing.name)
+    return tuple(found)
+
+
+def _located_directions(bearing: Bearing) -> set[float]:
+    """Signs along z of the axial loads on the inner ring that a bearing carries."""
+    if bearing.catalogue is None:
+        return {-1.0, 1.0} if linear_law(bearing, 0.0).stiffness[2, 2] > 0.0 else set()
+    rows = bearing_rows(bearing)
+    if any(isinstance(row, BallRow) and row.contact_angle == 0.0 for row in rows):
+        return {-1.0, 1.0}
+    return {math.copysign(1.0, row.contact_angle) for row in rows if row.contact_angle != 0.0}
 
 
 def is_stated(bearing: Bearing) -> bool:

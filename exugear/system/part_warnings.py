@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from exugear.gearbox.gear_parts import thinning_range
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import operating_range, summarise_loads
-from exugear.gearbox.parts import Bearing, Body, PairSpec
+from exugear.gearbox.parts import Bearing, Body, PairSpec, connector_matrix
 from exugear.gearbox.sections.designations import boundary_of
 from exugear.gearbox.units import MM, RPM, si
 from exugear.system.bodies.seated_items import seat_width
@@ -45,8 +45,8 @@ WHEEL, LEAST_SEAT, LEAST_OVER_SHAFT = 1.5, 0.98, 0.9
 bore of a mounted gear over the bores of the bearings on both sides, and over the shaft under it in the file."""
 OTHER_SIZE, MOST_WALL = 0.01, 4.0
 """Difference of a diameter from that of the designation, and outer diameter of a bearing over its bore."""
-TILTING = ("deep_groove_ball", "self_aligning_ball", "angular_contact_ball", "four_point_ball", "spherical_roller")
-"""Types of bearings of which a single row does not keep a shaft from tilting."""
+SELF_ALIGNING = ("self_aligning_ball", "spherical_roller", "thrust_spherical_roller")
+"""Types of bearings that do not resist tilting with any number of rows; of the others, a single row barely does."""
 
 
 def part_warnings(gearbox: Gearbox) -> Iterator[str]:
@@ -54,10 +54,11 @@ def part_warnings(gearbox: Gearbox) -> Iterator[str]:
     yield from _masses(gearbox)
     yield from _bores(gearbox)
     yield from _seats(gearbox)
+    yield from _seats_beyond_shapes(gearbox)
     yield from _bearings(gearbox)
     yield from _faces(gearbox)
     yield from _backlashes(gearbox)
-    yield from _shafts_on_one_bearing(gearbox)
+    yield from shafts_on_one_bearing(gearbox)
     yield from _faces_in_bearings(gearbox)
     yield from _speed_limits(gearbox)
 
@@ -208,6 +209,28 @@ def _shaft_under(gearbox: Gearbox, body: Body, gear: Gear, place: float) -> floa
     return min(found, default=None)
 
 
+def _seats_beyond_shapes(gearbox: Gearbox) -> Iterator[str]:
+    """Yield bearings and gears whose middle is beyond the shape of their body, which then lacks mass and stiffness."""
+    bodies = gearbox.named_bodies
+    for family, section in gearbox.case.bodies.items():
+        if section.shape is None:
+            continue
+        start = si(section.shape, "start_z_mm")
+        end = start + sum(si(piece, "length_mm") for piece in section.shape.sections)
+        places = {
+            f"bearings.{bearing.family}.z_mm": bearing.position[2]
+            for bearing in gearbox.bearings
+            if bodies[bearing.body].family == family
+        }
+        places |= {f"bodies.{family}.gears_z_mm.{gear}": MM * z_mm for gear, z_mm in section.gears_z_mm.items()}
+        for key, place in places.items():
+            if not start - LEAST_CLASH < place < end + LEAST_CLASH:
+                yield (
+                    f"{key} = {1e3 * place:g}: beyond the shape of {family}, which extends from {1e3 * start:g} to "
+                    f"{1e3 * end:g} mm; correct the position, or the sections of bodies.{family}.shape"
+                )
+
+
 def _bearings(gearbox: Gearbox) -> Iterator[str]:
     """Yield bearings with diameters other than their designation states, or than any bearing has."""
     for name, section in gearbox.case.bearings.items():
@@ -279,19 +302,24 @@ def _backlashes(gearbox: Gearbox) -> Iterator[str]:
             )
 
 
-def _shafts_on_one_bearing(gearbox: Gearbox) -> Iterator[str]:
-    """Yield shafts with gears that are supported by only one bearing, of a type that is compliant in tilting."""
+def shafts_on_one_bearing(gearbox: Gearbox) -> Iterator[str]:
+    """Yield shafts with gears that are supported by only one bearing, which barely resists tilting."""
     reported = set()
     for body in gearbox.bodies():
         bearings = [bearing for bearing in gearbox.bearings if body.name in (bearing.body, bearing.on)]
         if len(bearings) != 1 or body.fixed or body.planet_of is not None or body.family in reported or not body.wheels:
             continue
         catalogue = bearings[0].catalogue
-        if catalogue is not None and catalogue.type in TILTING and catalogue.arrangement == "single":
+        if catalogue is None or catalogue.arrangement != "single":
+            continue
+        if connector_matrix(bearings[0].stiffness)[3, 3] > 0.0:
+            continue
+        if (catalogue.row_count or 1) == 1 or catalogue.type in SELF_ALIGNING:
             reported.add(body.family)
             yield (
-                f"bearings.{bearings[0].family}: the only bearing of {body.family}; one "
-                f"{catalogue.type.replace('_', ' ')} bearing has almost no tilting stiffness; is a bearing missing?"
+                f"bodies.{body.family}: supported by one bearing ({bearings[0].family}) only, and one "
+                f"{catalogue.type.replace('_', ' ')} bearing barely resists tilting; add a second [bearings.NAME], or "
+                "set rows that resist tilting (arrangement or row_count)"
             )
 
 

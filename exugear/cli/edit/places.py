@@ -97,7 +97,7 @@ _AT_LINE = re.compile(r"\(at line (\d+), column \d+\)")
 _KEY_FIRST = re.compile(r"([A-Za-z0-9_-]+(?:\.[A-Za-z0-9_-]+)*)(?= = |: |:$)")
 _ANY_KEY = re.compile(r"[A-Za-z0-9_-]+(?:\.[A-Za-z0-9_-]+)+")
 _MEANT = re.compile(r"did you mean '([^']+)'\?")
-_VALUE = re.compile(r" = '([^']*)': did you mean")
+_VALUE = re.compile(r" = '([^']*)': (?:no such [a-z ]+; )?did you mean")
 _RENAMED = re.compile(r"was renamed to (?:[\w.]*\.)?(\w+);")
 
 
@@ -131,7 +131,7 @@ def _placed(message: str, kind: Literal["error", "warning"], text: str, known: M
 
 def _correction(message: str, key: str, known: Mapping[str, int]) -> tuple[str, str]:
     """Return old and new text of the only possible correction of an error; empty texts if there is none."""
-    if message.endswith(": this key is missing"):
+    if ": this key is missing" in message:
         table, _, name = key.rpartition(".")
         of_kind = re.sub(r"^(\w+)\.\w+", r"\1.NAME", table)
         keys_of_kind = (one for one in schema_for_completion() if one["table"] == of_kind)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import threading
-import tomllib
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -25,7 +24,7 @@ from exugear.cli.tasks import check as check_task
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import operating_range
 from exugear.gearbox.named_files import NOTHING_MORE, Permissions
-from exugear.gearbox.reading import GearboxFileError, parsed
+from exugear.gearbox.reading import GearboxFileError, parsed_toml
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.words import Labels
@@ -168,7 +167,7 @@ class Analyst:
         content = None
         try:
             plain = text.replace("\r\n", "\n").replace("\r", "\n")
-            content = parsed(lambda: tomllib.loads(plain), self._source, "TOML")
+            content = parsed_toml(plain, self._source)
             gearbox = checked_gearbox(content, self._source, self._permissions)
             # Errors of loads and of the train are found only when these are used.
             with model_errors():

@@ -11,7 +11,7 @@ from typing import Any
 
 from exugear.cli.case import assembled_by_iso, read_gearbox, steady_lack
 from exugear.cli.console import BadInputError, FailedError, model_errors, print_json
-from exugear.cli.tables import HARD_SPACE, Column, Outcome, Table, detail, significant
+from exugear.cli.tables import HARD_SPACE, Column, Outcome, Table, bearings_of_remarks, detail, significant
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import load_case_warnings, summarise_loads
 from exugear.gearbox.reading import GearboxFileError
@@ -25,7 +25,7 @@ from exugear.system.bodies.external_of_gearbox import external_facts
 from exugear.system.bodies.of_gearbox import solids_of
 from exugear.system.gearbox_checks import gearbox_warnings, lacking
 from exugear.system.modes import modes_of, unusual_damping
-from exugear.system.operating_points import bearing_duties, bearing_points
+from exugear.system.operating_points import bearing_duties, bearing_points, opposed_bearings
 from exugear.system.part_warnings import backlash_range, pair_margins, thickness_range
 from exugear.system.system import Assembly
 from exugear.transient.plan import check_duration
@@ -36,14 +36,15 @@ def check(case: Path, allow_dir: Path | None, as_json: bool, whole: bool) -> Non
     """Check a gearbox file and print its summary."""
     gearbox = _read(case, allow_dir, as_json)
     summary = summarise(gearbox)
-    warnings = [*script_notes(gearbox), *summary["warnings"]]
+    # A wrong sign of a torque has consequences among the other warnings: seals and bearings that turn too fast.
+    warnings = [f"load_cases.{own['load_case']}: {line}" for own in summary["load_cases"] for line in own["doubts"]]
+    warnings += [*script_notes(gearbox), *summary["warnings"]]
     warnings += [own["span_doubt"] for own in summary["tooth_thickness"] if own["span_doubt"]]
-    warnings += [f"load_cases.{own['load_case']}: {line}" for own in summary["load_cases"] for line in own["doubts"]]
     Outcome(
         verdict=f"{gearbox.name}: no errors; {gearbox.train.ratio_text}",
         summary=summary,
         tables=check_tables(gearbox.case.overall.input, summary),
-        findings=[Finding("warning", line) for line in warnings],
+        findings=[*(Finding("warning", line) for line in warnings), *_opposed_bearings(gearbox)],
         remarks=[*summary["matrices"], *availability(summary)],
     ).show(as_json, whole)
 
@@ -56,6 +57,17 @@ def _read(case: Path, allow_dir: Path | None, as_json: bool) -> Gearbox:
         if as_json and isinstance(error.__cause__, GearboxFileError):
             print_json({"case": str(case), "errors": list(error.__cause__.errors)})
         raise
+
+
+def _opposed_bearings(gearbox: Gearbox) -> Iterator[Finding]:
+    """Yield a note on single bearings in X or O arrangement, which the linear model keeps in both directions."""
+    families = {bearing.name: bearing.family for bearing in gearbox.bearings}
+    if names := dict.fromkeys(families[name] for name in opposed_bearings(gearbox)):
+        yield Finding(
+            "note",
+            f"bearings.{', '.join(names)}: locate in one axial direction each, opposed to each other; with "
+            "model = 'linear' their axial stiffness acts in both directions",
+        )
 
 
 def script_notes(gearbox: Gearbox) -> Iterator[str]:
@@ -210,7 +222,8 @@ def _bearing_summaries(
             for effect, pair in zip(effects[family], ends, strict=True)
         }
         summaries.append({**duty_summary(duty), "bearing": family, "estimated": estimated})
-    doubts = [f"bearings.{duty.name}: {remark}" for duty in every for remark in duty.remarks]
+    remarks = bearings_of_remarks((duty.family, duty.remarks) for duty in every)
+    doubts = [f"bearings.{', '.join(names)}: {remark}" for remark, names in remarks.items()]
     return summaries, doubts
 
 

@@ -212,7 +212,9 @@ class RatingSection(Section):
     """Auxiliary factor of the contact stress of helical gears (ISO 6336-2:2019) for pairs with a `modification`; less
     than 1.2 requires a modification that suits load and deflection. Other helical gears have 1.2."""
     dynamic_factor: q.LoadFactorK | None = None
-    """Specified K_v of all meshes; or one of the next two keys together with `minimum_dynamic_factor`."""
+    """Specified K_v of all meshes for `exugear life`; or one of the next two keys together with
+    `minimum_dynamic_factor`. The rating sheet takes it only for pairs without `tolerance_class` of both gears; of other
+    pairs it computes K_v to method B."""
     dynamic_factor_run: Name | None = None
     """Load case whose run determines K_v over speed: maximum divided by mean force of each mesh within 20 cycles."""
     dynamic_factor_steady: Literal["linear", "parametric", "nonlinear"] | None = None

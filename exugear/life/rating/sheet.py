@@ -334,7 +334,12 @@ def _assumptions(gearbox: Gearbox, rating: RatingSection) -> Iterator[str]:
             yield "nominal_hours of [rating] is missing: teeth are rated for at least 1e10 load cycles"
     elif rating.application_factor != 1.0:
         yield "application_factor is for nominal loads: K_A = 1 under [loads]"
-    if rating.dynamic_factor is None:
+    if rating.dynamic_factor is not None and any(strength.tolerance_class for strength in rating.gears.values()):
+        yield (
+            f"K_v to method B of pairs with tolerance_class; rating.dynamic_factor = {rating.dynamic_factor:g} applies "
+            "to pairs without it, to finite element values and to exugear life"
+        )
+    elif rating.dynamic_factor is None:
         yield "K_v other than to the standard: minimum_dynamic_factor (runs and responses are not evaluated here)"
 
 

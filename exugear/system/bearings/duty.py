@@ -244,12 +244,13 @@ def _two_designs(section: CatalogueSection, taken: KnownRating) -> str:
     )
 
 
-def duty_of(point: OperatingPoint, reaction: Floats | None = None) -> BearingLoadState:
+def duty_of(point: OperatingPoint, reaction: Floats | None = None, *, is_opposed: bool = False) -> BearingLoadState:
     """Find what a bearing bears at its operating point.
 
     Parameters
     ----------
     reaction : (6,) for a bearing whose load the file states: what the statics find, N and N m
+    is_opposed : whether another bearing of its body locates against the axial load that it cannot carry
     """
     bearing = point.bearing
     rows = point.rows
@@ -285,7 +286,7 @@ def duty_of(point: OperatingPoint, reaction: Floats | None = None) -> BearingLoa
             inner_ring_turns_against_load=not bearing.carries_outer_ring,
         ),
         reaction=None if reaction is None else math.hypot(reaction[0], reaction[1]),
-        remarks=tuple(_remarks(point, ratings, reaction)),
+        remarks=tuple(_remarks(point, ratings, reaction, is_opposed)),
     )
 
 
@@ -305,7 +306,7 @@ def _largest_load(state: BearingState) -> float:
     return max(float(state.element_load[begin:end].max()) for row, begin, end in of_rows if not is_rib(row))
 
 
-def _remarks(point: OperatingPoint, ratings: LoadRatings, reaction: Floats | None) -> list[str]:
+def _remarks(point: OperatingPoint, ratings: LoadRatings, reaction: Floats | None, is_opposed: bool) -> list[str]:
     section = point.bearing.catalogue
     rows = point.rows
     assert section is not None
@@ -323,9 +324,12 @@ def _remarks(point: OperatingPoint, ratings: LoadRatings, reaction: Floats | Non
                 f"radial_load_kN = {1e-3 * point.radial_load:.4g} is specified; the static load results in "
                 f"{1e-3 * found:.4g}"
             )
-    if holds_one_way(rows):
-        sense = "+z" if rows[0].contact_angle > 0.0 else "-z"
-        remarks.append(f"locates its inner ring axially in one direction only, against a load towards {sense}")
+    if holds_one_way(rows) and not is_opposed:
+        sense, other = ("+z", "-z") if rows[0].contact_angle > 0.0 else ("-z", "+z")
+        remarks.append(
+            f"locates its inner ring axially in one direction only, against a load towards {sense}; no other bearing "
+            f"of its body carries a load towards {other}"
+        )
     static = equivalent_static_load(rows, section.type, point.radial_load, abs(float(point.load[2])))
     if static > ratings.static:
         estimated = " estimated" if ratings.estimated else ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -75,8 +76,39 @@ def test_check_tells_load_and_range_of_what_is_estimated_and_writes_nothing(case
     with_little, with_much = ball["estimated"]["radial_clearance_mm"]["radial_stiffness_N_per_m"]
     assert with_little == pytest.approx(ball["radial_stiffness_N_per_m"])  # none is what is taken
     assert with_much < with_little
-    assert any("taper_1: locates its inner ring axially in one direction only" in w for w in summary["warnings"])
     assert [path.name for path in case.parent.iterdir()] == [case.name]
+
+
+def test_check_notes_opposed_tapered_bearings_in_one_line_and_warns_of_a_single_one(case: Path) -> None:
+    findings = json.loads(exugear("check", case, "--json").stdout)["findings"]
+    notes = [own["text"] for own in findings if own["level"] == "note"]
+    assert notes == [
+        "bearings.taper_1, taper_2: locate in one axial direction each, opposed to each other; with model = 'linear' "
+        "their axial stiffness acts in both directions"
+    ]
+    one_way = "locates its inner ring axially in one direction only"
+    assert not any(one_way in own["text"] for own in findings)
+    # The ball bearing of the other shaft, as an angular contact bearing: nothing holds that shaft the other way.
+    single = rewritten(case, ('type = "deep_groove_ball"', 'type = "angular_contact_ball"\ncontact_angle_deg = 40.0'))
+    push = '[forces.axial]\nbody = "shaft_1"\nz_mm = 0.0\nforce_N = [1.0, 0.0, 2000.0]\n'
+    single.write_text(single.read_text("utf-8") + push, encoding="utf-8")
+    warnings = json.loads(exugear("check", single, "--json").stdout)["warnings"]
+    assert any(
+        f"bearings.ball: {one_way}, against a load towards +z; no other bearing of its body carries a load towards -z"
+        == line
+        for line in warnings
+    ), warnings
+
+
+def test_check_puts_the_sign_of_a_torque_before_warnings_that_follow_from_it(tmp_path: Path) -> None:
+    text = (files("exugear.gearbox.templates") / "parallel.toml").read_text("utf-8")
+    assert "output = -" in text
+    wrong = tmp_path / "gearbox.toml"
+    wrong.write_text(text.replace("output = -", "output = "), encoding="utf-8")
+    findings = json.loads(exugear("check", wrong, "--json").stdout)["findings"]
+    warnings = [own["text"] for own in findings if own["level"] == "warning"]
+    assert warnings[0].startswith("load_cases.")
+    assert any(line.startswith("seals.") for line in warnings[1:])
 
 
 def test_check_compares_a_stated_load_with_the_reaction(case: Path) -> None:

@@ -170,6 +170,45 @@ def test_unreadable_files_are_one_clear_message(tmp_path: Path, text: str, words
     assert str(path) in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("line", "remedy"),
+    [
+        ("held_diameter_mm = 36,0", "'held_diameter_mm = 36,0'; numbers have a decimal point: write 36.0"),
+        ("place = { z_mm = -1,5, body = 3 }", "numbers have a decimal point: write -1.5"),
+        ("body = input  # of the motor", '; text needs quotes: "input"'),
+        ("fixed = True", "; write true"),
+        ("teeth 21", "'teeth 21'"),
+    ],
+)
+def test_a_line_that_is_not_toml_is_quoted_with_its_remedy(tmp_path: Path, line: str, remedy: str) -> None:
+    path = tmp_path / "broken.toml"
+    path.write_text(f"name = 'x'\n{line}\n", encoding="utf-8")
+    with pytest.raises(GearboxFileError) as caught:
+        Gearbox.from_toml(path)
+    assert "(at line 2, column " in str(caught.value)
+    assert str(caught.value).endswith(remedy)
+
+
+@pytest.mark.parametrize(
+    ("key", "example"),
+    [
+        (["static_load"], 'static_load = { torques_N_m = { carrier = 240000.0 }, locked = ["hss"] }'),
+        (["default_inertias"], 'default_inertias = "assemblies"'),
+        (["overall", "output"], 'output = "hss"'),
+        (["gears", "sun", "teeth"], "teeth = 21"),
+    ],
+)
+def test_a_missing_key_is_told_with_an_example(content: dict, key: list[str], example: str) -> None:
+    table = content
+    for part in key[:-1]:
+        table = table[part]
+    del table[key[-1]]
+    with pytest.raises(GearboxFileError) as caught:
+        Gearbox.from_dict(content)
+    expected = f"{'.'.join(key)}: this key is missing; for example {example}"
+    assert [error for error in caught.value.errors if error.endswith(expected)], caught.value.errors
+
+
 def test_missing_and_binary_files_are_one_clear_message(tmp_path: Path) -> None:
     with pytest.raises(GearboxFileError, match="no such file"):
         Gearbox.from_toml(tmp_path / "nowhere.toml")

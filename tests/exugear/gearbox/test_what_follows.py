@@ -188,11 +188,30 @@ def test_shifts_that_nothing_gives_are_refused() -> None:
         GearboxFileError, match="set profile_shift or profile_shift_from_centre_distance = true, not both"
     ):
         gearbox_of(("held_diameter_mm = 50.0 }", f"held_diameter_mm = 50.0, profile_shift = 0.1{flag}"))
-    with pytest.raises(GearboxFileError, match="no line of action touches both base circles"):
+
+
+def test_teeth_that_do_not_fit_the_centre_distance_are_told_with_the_numbers() -> None:
+    """Reference centre distance 3 mm (20 + 30) / 2 = 75 mm; base circles touch at 75 cos 20 deg = 70.48 mm."""
+    with pytest.raises(
+        GearboxFileError,
+        match=r"pairs\.spur\.centre_distance_mm = 70: no line of action touches both base circles below 70\.48 mm; "
+        r"the reference centre distance is 75 mm \(20 and 30 teeth, module 3 mm, helix angle 0 deg\); check them",
+    ):
         gearbox_of(
-            ("held_diameter_mm = 50.0 }", f"held_diameter_mm = 50.0{flag}"),
+            ("held_diameter_mm = 50.0 }", "held_diameter_mm = 50.0, profile_shift_from_centre_distance = true }"),
             ("centre_distance_mm = 75.0", "centre_distance_mm = 70.0"),
         )
+
+
+def test_an_unknown_gear_of_a_pair_is_told_instead_of_what_follows_from_it() -> None:
+    with pytest.raises(GearboxFileError) as caught:
+        gearbox_of(
+            ("held_diameter_mm = 50.0 }", "held_diameter_mm = 50.0, profile_shift_from_centre_distance = true }"),
+            ('pinion = "pinion"', 'pinion = "pinon"'),
+        )
+    assert caught.value.errors == (
+        "case.toml: pairs.spur.pinion = 'pinon': no such gear; did you mean 'pinion'? gears are pinion, wheel",
+    )
 
 
 def test_a_tip_near_a_fillet_is_told_with_one_that_is_clear_and_fits_by_itself() -> None:

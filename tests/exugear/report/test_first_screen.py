@@ -251,6 +251,14 @@ class TestInABrowser:
             for name, value in zip(head, row, strict=True):
                 assert name in texts or value == "" or np.isfinite(float(value)), (name, value)
 
+    def test_the_rank_is_labelled_on_a_phone_which_has_no_heading_row(self, view: View) -> None:
+        view.page.set_viewport_size({"width": 390, "height": 844})
+        assert not view.page.locator(".quantities thead").is_visible()
+        content = "cell => getComputedStyle(cell, '::before').content + cell.dataset.label"
+        labels = [cell.evaluate(content) for cell in view.page.locator(".quantities td:nth-child(4)").all()]
+        assert labels and all("rank" in label and not label.startswith("none") for label in labels)
+        view.page.set_viewport_size({"width": 1440, "height": 900})
+
     def test_nothing_scrolls_sideways_on_a_phone(self, view: View, folder: Path) -> None:
         view.page.set_viewport_size({"width": 390, "height": 844})
         view.open(folder / "report.html")

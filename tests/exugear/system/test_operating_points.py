@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import re
+import tomllib
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -23,6 +25,7 @@ from exugear.system.build import assemble
 from exugear.system.gearbox_checks import lacking
 from exugear.system.loads import LoadTable
 from exugear.system.modes import modes_of
+from exugear.system.operating_points import opposed_bearings
 from exugear.system.statics import BalanceError, static_state
 from exugear.system.system import Assembly
 from exugear.transient.compiled.solver import CompiledSystem
@@ -145,6 +148,26 @@ def test_a_shaft_that_is_held_one_way_only_is_named_with_its_bearings(tmp_path):
         match="taper_1, taper_2: located axially in one direction only; check arrangements and `locates_towards`",
     ):
         on_bearings(loose)
+
+
+def test_a_shaft_on_one_bearing_without_equilibrium_is_named_instead_of_its_good_bearings():
+    content = tomllib.loads((files("exugear.gearbox.templates") / "parallel.toml").read_text("utf-8"))
+    del content["bearings"]["middle_left"], content["bearings"]["output_right"]
+    sizes = {"bore_mm": 40.0, "outer_diameter_mm": 90.0, "width_mm": 35.25, "contact_angle_deg": 13.0}
+    content["bearings"]["middle_right"]["catalogue"] = {"type": "tapered_roller", **sizes}
+    gearbox = Gearbox.from_dict(content)
+    with pytest.raises(BalanceError, match=r"bodies\.middle: supported by one bearing \(middle_right\) only"):
+        assemble(gearbox, Choice("bushing", "constant"), {name: np.array([4e8]) for name in gearbox.pairs})
+
+
+def test_single_bearings_are_opposed_where_another_one_of_the_body_carries_the_other_axial_load(tmp_path):
+    gearbox = bearing_gearbox(tmp_path)
+    assert opposed_bearings(gearbox) == ("taper_1", "taper_2")
+    same = gearbox.varied({"bearings.taper_1.catalogue.locates_towards": "+z"})
+    assert opposed_bearings(same) == ()
+    angular = {"type": "angular_contact_ball", "contact_angle_deg": 40.0}
+    alone = gearbox.varied({f"bearings.ball.catalogue.{key}": value for key, value in angular.items()})
+    assert opposed_bearings(alone) == ("taper_1", "taper_2")  # the cylindrical rollers beside it carry no axial load
 
 
 def test_a_non_linear_static_state_balances_what_plain_sums_over_the_rollers_give(tmp_path):

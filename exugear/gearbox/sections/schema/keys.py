@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import ast
 import inspect
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from itertools import groupby
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
@@ -23,6 +21,7 @@ from pydantic_core import PydanticUndefined
 
 from exugear.gearbox.sections.case import GearboxFile
 from exugear.gearbox.sections.entries import Range
+from exugear.gearbox.sections.examples import examples_by_table, written
 from exugear.gearbox.units import unit_suffix
 
 _SIGNS = {"_per_": "/", "_": " ", "m2": "m²", "s2": "s²", "m3": "m³", "um": "µm", "hours": "h", "percent": "%"}
@@ -70,7 +69,7 @@ def tables() -> dict[str, type[BaseModel]]:
 
 def keys() -> Iterator[Key]:
     """All keys, table by table; keys that hold a table are omitted because the table is listed."""
-    examples = tomllib.loads(files(__package__).joinpath("examples.toml").read_text(encoding="utf-8"))
+    examples = examples_by_table()
     for table, model in tables().items():
         texts = meanings(model)
         given = _example_of_table(examples, table)
@@ -164,28 +163,6 @@ def _default(field: FieldInfo) -> str:
     if field.default is None or field.default in ((), {}, ""):
         return "none"
     return written(field.default)
-
-
-def written(value: object) -> str:
-    """Return a value in the notation of a gearbox file.
-
-    Examples
-    --------
-    >>> written(True), written((1.0, 2e6)), written({"hss": 3.5})
-    ('true', '[1.0, 2e+06]', '{ hss = 3.5 }')
-    """
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, float):
-        short = f"{value:g}"
-        return short if set(short) & set(".e") else f"{short}.0"
-    if isinstance(value, Mapping):
-        return f"{{ {', '.join(f'{key} = {written(entry)}' for key, entry in value.items())} }}"
-    if isinstance(value, tuple | list):
-        return f"[{', '.join(map(written, value))}]"
-    if isinstance(value, str):
-        return f'"{value}"'
-    return str(value)
 
 
 # The JSON schema of the gearbox file, with which editors show keys and ranges during typing

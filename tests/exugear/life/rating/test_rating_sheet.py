@@ -220,6 +220,15 @@ def test_a_sheet_shows_both_editions_where_they_differ(tmp_path):
     assert not any(flank.other_edition for flank in straight.flanks), "spur gears are rated alike"
 
 
+def test_a_sheet_says_where_it_does_not_use_the_stated_dynamic_factor(tmp_path):
+    """Method B does not depend on it, so two values give the same K_v."""
+    one, other = (project_of(spur(tmp_path, dynamic_factor=stated), tmp_path).rating() for stated in (1.1, 1.5))
+    assert [flank.standard["K_v"] for flank in one.flanks] == [flank.standard["K_v"] for flank in other.flanks]
+    assert any("rating.dynamic_factor = 1.5 applies to pairs without it" in line for line in other.assumptions)
+    without = spur(tmp_path, gears={"pinion": dict(REDUCED), "wheel": dict(REDUCED)})
+    assert not any("rating.dynamic_factor" in line for line in project_of(without, tmp_path).rating().assumptions)
+
+
 def test_f_zca_counts_for_modified_flanks_alone(tmp_path):
     content = helical(tmp_path, f_ZCa=1.05)
     content["gears"]["pinion"]["modification"] = {"tip_relief_um": 10.0, "tip_relief_length_mm": 1.0}

@@ -92,7 +92,7 @@ MISTAKES: dict[str, tuple[str, Callable[[dict[str, Any]], None], str]] = {
         in_square_millimetres,
         "bodies.output.inertia.discs.axial_kg_m2 = 33100: with 10.5 kg the radius of gyration is 5.61e",
     ),
-    "one bearing": ("pair", without_a_bearing, "bearings.output_left: the only bearing of output"),
+    "one bearing": ("pair", without_a_bearing, "bodies.output: supported by one bearing (output_left) only"),
     "centre distance": ("pair", further_apart, "pairs.helical.centre_distance_mm = 129: backlash is 926 µm, about"),
     "profile shift": (
         "pair",
@@ -165,6 +165,58 @@ def test_imports_raise_no_alarm(path: Path) -> None:
     except RexsError:
         pytest.skip("refused in words, which the tests of imports hold")
     assert list(part_warnings(gearbox)) == []
+
+
+def test_seats_beyond_the_shape_of_their_shaft_are_named_with_both_positions() -> None:
+    """The high-speed shaft of the GRC cut off after 100 mm, and one of its bearings before its start."""
+    path = ROOT / "cases/grc750/gearbox.toml"
+    content = tomllib.loads(path.read_text("utf-8"))
+    shape = content["bodies"]["hss"]["shape"]
+    shape["sections"] = [{**shape["sections"][0], "length_mm": 100.0}]
+    start, end = shape["start_z_mm"], shape["start_z_mm"] + 100.0
+    content["bearings"]["hss_a"]["z_mm"] = start - 500.0
+    gear_z = content["bodies"]["hss"]["gears_z_mm"]["hs_pinion"]
+    bearing_z = content["bearings"]["hss_bc"]["z_mm"]
+    assert min(gear_z, bearing_z) > end
+    found = [line for line in part_warnings(Gearbox.from_dict(content, str(path))) if "beyond the shape of hss" in line]
+    assert [line.partition(":")[0] for line in found] == [
+        f"bearings.hss_a.z_mm = {start - 500.0:g}",
+        f"bearings.hss_bc.z_mm = {bearing_z:g}",
+        f"bodies.hss.gears_z_mm.hs_pinion = {gear_z:g}",
+    ]
+    assert all(f"which extends from {start:g} to {end:g} mm" in line for line in found)
+
+
+ONE_BEARING = "bodies.output: supported by one bearing (output_left) only"
+
+
+@pytest.mark.parametrize(
+    ("catalogue", "named"),
+    [
+        ({"type": "tapered_roller", "contact_angle_deg": 14.0}, True),
+        ({"type": "tapered_roller", "contact_angle_deg": 14.0, "arrangement": "O"}, False),
+        ({"type": "cylindrical_roller"}, True),
+        ({"type": "cylindrical_roller", "row_count": 2}, False),
+        ({"type": "spherical_roller", "row_count": 2}, True),
+    ],
+)
+def test_a_shaft_on_one_bearing_is_named_unless_its_rows_resist_tilting(catalogue: dict[str, Any], named: bool) -> None:
+    content = template("pair")
+    without_a_bearing(content)
+    sizes = {"bore_mm": 50.0, "outer_diameter_mm": 90.0, "width_mm": 20.0}
+    content["bearings"]["output_left"]["catalogue"] = sizes | catalogue
+    assert any(line.startswith(ONE_BEARING) for line in part_warnings(Gearbox.from_dict(content))) == named
+
+
+@pytest.mark.parametrize("has_catalogue", [False, True])
+def test_a_shaft_on_one_bearing_with_stated_tilting_stiffness_is_not_named(has_catalogue: bool) -> None:
+    content = template("pair")
+    without_a_bearing(content)
+    if not has_catalogue:
+        content["bearings"]["output_left"].pop("catalogue")
+    stiff = {"radial_N_per_m": 5e8, "axial_N_per_m": 5e8, "tilt_N_m_per_rad": 1e6}
+    content["bearings"]["output_left"]["stiffness"] = stiff
+    assert not [line for line in part_warnings(Gearbox.from_dict(content)) if line.startswith("bodies.output")]
 
 
 def test_backlash_of_the_recommendation_is_that_of_its_formula() -> None:
