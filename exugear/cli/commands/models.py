@@ -131,8 +131,7 @@ def steady(
         str | None,
         typer.Option(
             metavar="FIRST:LAST",
-            help="Range of input speeds, rpm, positive about +z. (default: from standstill to the highest of the first "
-            "load case and of [operation])",
+            help="Range of input speeds, rpm, positive about +z. (default: 0 to the highest speed in the file)",
             show_default=False,
         ),
     ] = None,

@@ -182,7 +182,10 @@ def left(**changes: Any) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"tacho": {"channel": "tacho", "shaft": "inputs"}}, "bench.tacho.shaft = 'inputs': no such shaft; shafts are"),
+        (
+            {"tacho": {"channel": "tacho", "shaft": "inputs"}},
+            "bench.tacho.shaft = 'inputs': no such shaft; did you mean 'input'",
+        ),
         ({"tacho": None}, "set either tacho = .* or speed ="),
         ({"load_case": "full"}, "load_case = 'full': no such load case; load cases are run_up"),
         ({"window_revolutions": 0.5}, "window_revolutions = 0.5: must lie between 1 and 1000"),
