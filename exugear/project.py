@@ -706,7 +706,7 @@ def results_folder(case: str | Path, out: str | Path | None = None) -> Path:
     other = stored_source(folder)
     if other is not None and other.is_file() and Path(case).is_file() and not other.samefile(case):
         raise GearboxFileError(
-            f"{case}: {folder} contains the results of another file, {other.name}; specify a folder for this one: "
+            f"{case}: {folder} contains the results of another file, {other.name}; compute those of this one with "
             f"--out {folder}-{Path(case).stem}"
         )
     return folder
