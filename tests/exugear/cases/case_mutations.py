@@ -110,7 +110,7 @@ def _modified() -> dict[str, Any]:
     case["bearings"]["bearing_1"]["damping"] = {"radial_N_s_per_m": 100.0, "axial_N_s_per_m": 10.0}
     case["gears"]["wheel"]["held_diameter_mm"] = 64.0  # around the bearing
     case["bearings"]["bearing_2"] = {
-        "body": "shaft_2", "z_mm": 0.0, "stiffness": {"axial_N_per_m": 1e8},
+        "body": "shaft_2", "z_mm": 0.0, "stiffness": {"axial_N_per_m": 1e8, "tilt_N_m_per_rad": 1e5},
         "catalogue": {"type": "cylindrical_roller", "bore_mm": 30.0, "outer_diameter_mm": 62.0, "width_mm": 16.0,
                       "radial_load_kN": 3.0, "radial_clearance_mm": 0.01},
     }  # fmt: skip
