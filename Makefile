@@ -83,7 +83,7 @@ FIND_PYTHON := for candidate in $(if $(PYTHON),"$(PYTHON)",python3 python3.13 py
 	echo "exugear needs Python 3.11, 3.12 or 3.13; found: $$($(or $(PYTHON),python3) --version 2>&1)." >&2; \
 	echo "Install one, or specify it: make PYTHON=/path/to/python3.12 TARGET" >&2; exit 1
 
-.PHONY: test-browser help install demo demo-short test validate test-and-validate validate-long benchmarks check check-web vendor-web docs dist wheel-test wheel-test-all lock clean
+.PHONY: test-browser help install demo demo-short test validate validate-long benchmarks check check-web vendor-web docs dist wheel-test wheel-test-all lock clean
 
 help:
 	@echo "make demo        GRC 750 from gear data to waterfalls, modes and a report, into $(RESULTS)"
@@ -93,7 +93,6 @@ help:
 	@echo "make test PACKAGE=steady  tests of one package, such as steady"
 	@echo "make test-browser  tests of the report page in a browser, desktop and phone; requires chromium"
 	@echo "make validate    long comparisons with reference results"
-	@echo "make test-and-validate  both in one run of pytest"
 	@echo "make validate-long  the longest comparisons, before a release; recorded in docs/validation/index.md"
 	@echo "make benchmarks  run times, into benchmarks/results.md, README and docs"
 	@echo "make check       ruff and mypy"
@@ -142,10 +141,6 @@ test-browser: $(INSTALLED)
 
 validate: $(INSTALLED)
 	$(RUN)/python -m pytest -m "validation and not long" $(SIDE_BY_SIDE)
-
-# Both of these with one collection of the tests and one set of fixtures for each file.
-test-and-validate: $(INSTALLED)
-	$(RUN)/python -m pytest -m "not browser and not long" $(SIDE_BY_SIDE)
 
 # Each test tells its time and, as it goes, what it found.
 validate-long: $(INSTALLED) wheel-test-all
