@@ -37,8 +37,6 @@ from exugear.system.modal_damping import damping_in_words
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from exugear.system.tooth_mesh.tables import shuttling_pairs
 
-COUNTED = 1e-3
-"""Amplitude, over the highest of its quantity, from which a peak counts in "rank 3 of 40": 60 dB."""
 AT_RATED = 0.005
 """Relative speed difference from the rated speed that counts as none."""
 SHOWN_FRACTIONS = 2
@@ -113,7 +111,7 @@ def answer_section(material: ReportData) -> Part:
         "further": list(_further(material, headline, top, curves)),
     }
     quantities = ". ".join(
-        f"{one['title']} {one['value']} {one['unit']} (rank {one['rank']}{one['of']})" for one in answer["quantities"]
+        f"{one['title']} {one['value']} {one['unit']} (rank {one['rank']})" for one in answer["quantities"]
     )
     where = f"{answer['frequency']} at {answer['speed']}{answer['off_rated']}"
     notes.append(f"Highest resonance: {where}. {answer['sentence']} {quantities}.")
@@ -192,9 +190,6 @@ def _sentence(material: ReportData, headline: Headline, top: Resonance, mode: Ma
 def _quantity(material: ReportData, headline: Headline, top: Resonance, name: str) -> dict[str, Any]:
     label = QUANTITIES[name]
     own = top.amplitudes[name]
-    peaks = [other.amplitudes[name] for other in headline.ranking.resonances if other.amplitudes[name].place]
-    least = COUNTED * max((peak.amplitude for peak in peaks), default=0.0)
-    count = sum(peak.amplitude >= least for peak in peaks)
     band = ""
     if own.limits is not None:
         band = " to ".join(rounded_text(label.factor * limit.amplitude) for limit in reversed(own.limits))
@@ -208,7 +203,6 @@ def _quantity(material: ReportData, headline: Headline, top: Resonance, name: st
         "unit": label.unit,
         "band": band,
         "rank": own.place or "–",
-        "of": f" of {count}" * bool(own.place),
         "place": place,
     }
 

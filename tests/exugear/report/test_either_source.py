@@ -79,7 +79,7 @@ def test_words_say_that_figures_are_of_constant_speed_and_name_the_mode_without_
     report = write_report(folder)
     page = html.unescape(report.path.read_text(encoding="utf-8"))
     (card,) = [line for line in report.statements if line.startswith("Highest resonance")]
-    for words in ("Transmission error ±", "(rank 1 of ", "Acceleration at bearings ±"):
+    for words in ("Transmission error ±", "(rank 1)", "Acceleration at bearings ±"):
         assert words in card
     note = "Forces and accelerations: largest magnitude of the vector, at the bearing or mount where it is largest;"
     assert note in page and "Accelerations: of the shafts at bearings; the housing is rigid." in page
