@@ -1,9 +1,9 @@
 """How high the peaks of a steady response are at both ends of the plausible range of damping.
 
 Damping is the most uncertain input of a gearbox model. The highest peaks are therefore solved again with the lowest and
-the highest plausible damping (`damping.modal_band_percent`; half and twice the damping without it), at some speeds
-about each peak, where its maximum may have moved. Methods that are linear in the deflections only: with contact loss
-another damping may lead to another state.
+the highest plausible damping (`damping.modal_band_percent`; half and twice the damping without it). They are solved at
+three speeds about each peak, whose top may have moved, and the curve of a resonance goes through the three. This holds
+for methods that are linear in the deflections only: with contact loss another damping may lead to another state.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ FACTORS = (0.5, 2.0)
 """Factors on the damping where the file states no range."""
 MOST_PEAKS = 20
 """Highest peaks of each quantity that are solved again."""
-ABOUT = (0.0, -0.006, -0.003, -0.001, 0.001, 0.003, 0.006)
-"""Speeds about a peak at which it is solved again, relative to its own, this one first."""
-ABOUT_WITH_RING = (0.0, -0.003, 0.003)
-"""The same with a flexible ring gear, where a solution takes a hundred times as long."""
+BESIDE = 0.004
+"""Distance of the speeds on either side of a peak at which it is solved again, relative to its own speed."""
+MOST_RISE = 1.1
+"""Limit of the top of a curve, over the highest amplitude that was solved."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,23 +77,48 @@ def damping_band(model: HarmonicBalanceModel, method: Method, speed: Floats, amp
     found = np.zeros((len(point), len(quantities), 2))
     respond = {"linear": linear_response, "parametric": parametric_response}[method]
     damped = [model.with_system(system) for system in damping_limits(model.system)]
-    beside = ABOUT_WITH_RING if model.waves.neighbours else ABOUT
-    solves = list(product(range(len(damped)), np.unique(point), beside))
+    solves = list(product(np.unique(point), range(len(damped)), (-BESIDE, 0.0, BESIDE)))
 
     def sizes_at(solve: tuple[int, int, float]) -> Floats:
         """Sizes (lines, s) of the quantities in one solution."""
-        end, at, about = solve
-        response = respond(damped[end], damped[end].at(float(speed[at]) * (1.0 + about)))
+        at, end, beside = solve
+        response = respond(damped[end], damped[end].at(float(speed[at]) * (1.0 + beside)))
         own_signals = 2.0 * signals(damped[end], response)[line[point == at]]
         return np.stack([quantity.sizes(own_signals).max(axis=1) for quantity in quantities], axis=1)
 
-    sizes_of_all = side_by_side(sizes_at, solves) if model.waves.neighbours else map(sizes_at, solves)
-    for (end, at, about), sizes in zip(solves, sizes_of_all, strict=True):
+    sizes = iter(side_by_side(sizes_at, solves) if model.waves.neighbours else map(sizes_at, solves))
+    for at in np.unique(point):
         here = point == at
-        # A quantity without a peak there counts at the peak's speed: beside it others may rise.
-        counts = rises[here] | (about == 0.0)
-        found[here, :, end] = np.maximum(found[here, :, end], np.where(counts, sizes, 0.0))
+        for end in range(len(damped)):
+            before, middle, after = (next(sizes) for _ in range(3))
+            # A quantity without a peak there counts at the peak's speed: beside it others may rise.
+            found[here, :, end] = np.where(rises[here], resonance_top(before, middle, after), middle)
     return DampingBand(point, line, found, tuple(quantity.name for quantity in quantities))
+
+
+def resonance_top(before: Floats, middle: Floats, after: Floats) -> Floats:
+    """Highest amplitudes of resonance curves through amplitudes at three speeds of equal distance.
+
+    Near a resonance of light damping, the square of the reciprocal amplitude is a parabola over speed. Where its top
+    lies far outside the three speeds, or far above them, it is limited.
+
+    Examples
+    --------
+    Amplitudes of a mode with 1 % damping, whose top of 50 lies between two of the speeds:
+
+    >>> at = 1.003 * np.array([0.996, 1.0, 1.004])
+    >>> print(round(float(resonance_top(*(1.0 / np.hypot(1.0 - at**2, 0.02 * at))[:, None])[0]), 1))
+    50.0
+    """
+    solved = np.maximum(np.maximum(before, middle), after)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        first, second, third = (1.0 / amplitude**2 for amplitude in (before, middle, after))
+        bend = 0.5 * (first + third) - second
+        slope = 0.5 * (third - first)
+        at = np.clip(np.where(bend > 0.0, -0.5 * slope / bend, 0.0), -1.5, 1.5)
+        top = second + slope * at + bend * at**2
+        curve = np.where(top > 0.0, 1.0 / np.sqrt(top), np.inf)
+    return np.fmax(solved, np.where(bend > 0.0, np.fmin(curve, MOST_RISE * solved), solved))
 
 
 def damping_limits(system: MeanSystem) -> tuple[MeanSystem, MeanSystem]:
