@@ -256,6 +256,7 @@ def test_a_band_that_is_asked_for_is_kept_and_one_that_misses_a_mesh_is_told(cas
     assert iso("run", case, "--variant", "rigid", "--band", 0).exit_code == 2
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize("verb", ["check", "ste", "bearings", "life"])
 def test_contact_stresses_are_printed_with_load_factors_and_place(tmp_path, verb):
     content = (
@@ -299,6 +300,7 @@ def test_view_writes_a_page_where_nothing_can_be_rendered(case, monkeypatch):
     assert "pip install" in outcome.stderr
 
 
+@pytest.mark.validation
 def test_view_refuses_a_resonance_that_it_cannot_show(case):
     """There is no response; then one without resonances, since the stiffness is constant over the mesh cycle."""
     both = iso("view", case, "--near", 100, "--resonance", 1)

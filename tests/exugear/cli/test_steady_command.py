@@ -77,6 +77,7 @@ def test_the_sound_power_of_a_flexible_housing_follows_the_verdict_with_its_limi
     )
 
 
+@pytest.mark.validation
 def test_loads_of_runs_and_responses_are_told_and_a_response_can_be_at_that_of_a_load_case(case):
     text = case.read_text(encoding="utf-8").replace(
         "shaft_1 = 100.0, shaft_2 = 140.0", "shaft_1 = 40.0, shaft_2 = 50.0"

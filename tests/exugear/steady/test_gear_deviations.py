@@ -37,6 +37,7 @@ def spur_assembly(**deviations):
     return assemble(gearbox, Choice("bushing"), stiffness)
 
 
+@pytest.mark.validation
 def test_a_shaft_that_turns_slowly_shows_its_eccentricity():
     """Bearings are loaded all the same: the transmission error is that of rigid gears, half of the run-out.
 
@@ -47,6 +48,7 @@ def test_a_shaft_that_turns_slowly_shows_its_eccentricity():
     assert overall[solver.model.lines.orders == 1.0] == pytest.approx(10e-6, rel=1e-3)
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize(("level", "most"), [("linear", 4e-3), ("parametric", 1e-3)])
 @pytest.mark.parametrize("speed", [60.0, 100.0])
 def test_a_pair_with_run_out_started_on_its_steady_state_stays_there(level, most, speed):
@@ -56,6 +58,7 @@ def test_a_pair_with_run_out_started_on_its_steady_state_stays_there(level, most
     assert apart(solver, speed, 0.8, 1.0 / 60e3, 0.4, assembly)[0] < most
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize("speed", [75.0, 88.0])
 def test_pitch_deviations_of_both_gears_started_on_their_steady_state_stay_there(speed):
     """As before, with the orders of two shafts that have a mesh frequency in common; no order is near a mode."""
@@ -114,6 +117,7 @@ def test_the_power_of_the_deviations_is_what_the_dampers_dissipate():
     assert taken == pytest.approx(given, rel=1e-6)
 
 
+@pytest.mark.validation
 def test_lines_are_named_by_shaft_and_mesh_and_are_no_ratio_of_stages():
     """The file has the orders of shafts like all others; that a mesh is 20 times its shaft needs no words."""
     assembly = spur_assembly(one=RUN_OUT)

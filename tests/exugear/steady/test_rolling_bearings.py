@@ -78,6 +78,7 @@ def test_a_spur_pair_with_clearances_stays_on_its_steady_state(loose_solver, spe
     assert in_amplitude < 0.5 * most + 1e-4
 
 
+@pytest.mark.validation
 @pytest.mark.sample
 @pytest.mark.parametrize("speed", [60.0, 150.0])
 def test_teeth_by_their_table_and_bearings_by_their_elements_stay_on_their_steady_state(monkeypatch, speed):

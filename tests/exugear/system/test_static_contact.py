@@ -87,6 +87,7 @@ def test_static_state_is_that_of_the_law_of_whole_tables(kind: str) -> None:
     assert np.abs(radial_loads(state) / loads - 1.0)[loads > 0.1 * loads.max()].max() < 5e-3
 
 
+@pytest.mark.validation
 def test_a_third_step_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     for kind in ("grc", "relieved"):
         before = solved(kind).misalignment

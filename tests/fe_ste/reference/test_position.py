@@ -35,6 +35,7 @@ def test_a_coarse_position_of_open_sectors_comes_near_the_finest_mesh():
     assert found.ste == pytest.approx(31.720e-6, rel=0.02)
 
 
+@pytest.mark.validation
 def test_contact_forces_balance_the_torque_on_both_gears(solved):
     force, points = solved.equilibrium.contact_force, solved.model.bricks.points + solved.equilibrium.displacement
     moment = np.cross(points, force)[: solved.pinion_nodes, 2].sum()

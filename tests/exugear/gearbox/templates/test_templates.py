@@ -110,6 +110,7 @@ def test_the_template_without_an_option_is_that_of_parallel_stages(tmp_path: Pat
     assert path.read_text(encoding="utf-8") == template("parallel")
 
 
+@pytest.mark.validation
 def test_a_report_of_the_folder_of_the_gearbox_file_is_that_of_its_results(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -330,6 +330,7 @@ def test_finite_elements_of_a_life_stand_beside_its_spectrum_and_only_of_that_li
     assert any("another input" in line for line in other.assumptions)
 
 
+@pytest.mark.validation
 def test_the_life_of_another_variant_stands_beside_a_rating_and_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
     (tmp_path / "loads.csv").write_text("torque_N_m,speed_rpm,hours\n100,1500,500\n60,1500,500\n")

@@ -463,6 +463,7 @@ def test_a_damaged_mesh_of_gmsh_is_refused_and_never_run_as_a_script(tmp_path: P
     assert not told.exists()
 
 
+@pytest.mark.validation
 def test_more_modes_than_a_hundred_and_fifty_steps_find_are_those_of_a_dense_solver(monkeypatch):
     mesh = skfem.MeshHex2.from_mesh(
         skfem.MeshHex.init_tensor(np.linspace(0.0, 0.5, 5), np.linspace(0.0, 0.4, 4), np.linspace(0.0, 0.3, 4))

@@ -65,6 +65,7 @@ def flexible(carrying: Gearbox, stiffness: dict) -> Assembly:
     return assembled(carrying, Choice("flexible"), stiffness)
 
 
+@pytest.mark.validation
 def test_a_flexible_carrier_has_damping_times_where_the_file_states_a_share(
     carrying: Gearbox, flexible: Assembly, stiffness: dict
 ) -> None:

@@ -149,6 +149,7 @@ def test_force_is_the_gradient_of_the_potential_at_frozen_position(
     assert np.abs(force + gradient).max() < 2e-5 * np.abs(force).max()
 
 
+@pytest.mark.validation
 def test_compiled_solver_has_the_same_forces_signals_and_energies(grc: Gearbox, tables: dict) -> None:
     load = {"carrier": 2.4e5, "hss": -3.0e3}
     for assembly, q, v in cases(grc, tables):

@@ -289,6 +289,7 @@ def test_step_follows_from_band_and_eigenfrequencies(grc: Gearbox, stiffness: di
     assert 1.0 / (chosen * 20e3) == pytest.approx(round(1.0 / (chosen * 20e3)), abs=1e-9)
 
 
+@pytest.mark.validation
 def test_file_tells_solver_step_and_what_it_follows_from(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
     attributes = load_run(simulate(grc, Choice("bushing"), stiffness, tmp_path, duration=0.01).path).attrs
     assert attributes["solver"] == "compiled, Adams of order 5"

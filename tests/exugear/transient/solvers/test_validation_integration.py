@@ -53,6 +53,7 @@ def departure(
     return {name: deviation(chosen, fine, name) for name in SIGNALS}
 
 
+@pytest.mark.validation
 def test_stored_signals_with_elastic_shafts_are_those_of_the_runge_kutta_method_at_a_fine_step(
     grc_shafts: Gearbox, stiffness: dict, tmp_path: Path
 ) -> None:
