@@ -22,7 +22,7 @@ from exugear.gearbox.templates.kinds import KINDS, template
 
 PAGE = ROOT / "docs" / "howto" / "editor_in_the_browser.md"
 MARKS = ("<!-- figures of benchmarks/edit_page.py -->", "<!-- end of figures -->")
-STEPS = {"check": "errors, kinematics", "dynamics": "modes, Campbell diagram", "picture": "picture", "loads": "loads"}
+STEPS = {"check": "errors, kinematics", "picture": "picture", "dynamics": "modes, Campbell diagram", "loads": "loads"}
 ROUNDS = 7
 #: Notes when a key is pressed, and when each part is no longer grey.
 WATCH = """() => {

@@ -63,16 +63,16 @@ export class Stage {
   }
 
   /**
-   * Show a mode of a model; other bodies are built anew.
+   * Show a mode of a model, or its bodies at rest without motions; other bodies are built anew.
    * @param {import("./page_data.js").StageData} data
    * @param {number} mode
    */
   async show(data, mode) {
     const mine = ++this.asked;
-    const motions = /** @type {Float32Array} */ (await unpack(data.motions));
+    const motions = data.motions ? /** @type {Float32Array} */ (await unpack(data.motions)) : null;
     /** @type {Record<number, Int8Array>} */
     const fields = {};
-    for (const [place, reference] of Object.entries(data.deformed[String(mode)] ?? {})) {
+    for (const [place, reference] of Object.entries(data.deformed?.[String(mode)] ?? {})) {
       fields[Number(place)] = /** @type {Int8Array} */ (await unpack(reference));
     }
     const same = data === this.data || (data.geometry !== undefined && data.geometry === this.data?.geometry);
