@@ -100,7 +100,8 @@ def main() -> None:
             print(lines[-1], flush=True)
     about = machine()
     where = f"{about['cores']} cores ({about['processor']}) without graphics card"
-    told = [f"Medians of {ROUNDS} key strokes on {where}.", f"Load average at the start: {before}."]
+    others = ": other programs were using the machine" if before > 1.0 else ""
+    told = [f"Medians of {ROUNDS} key strokes on {where}.", f"Load average at the start: {before}{others}."]
     text = "\n".join([*lines, "", *told])
     print(text)
     if wanted.write:
