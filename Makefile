@@ -137,7 +137,7 @@ test: $(INSTALLED)
 
 # Pages in a real browser: skipped, and said, where no chromium is.
 test-browser: $(INSTALLED)
-	$(RUN)/python -m pytest -m browser tests/exugear/report
+	$(RUN)/python -m pytest -m "browser and not long" tests/exugear/report
 
 validate: $(INSTALLED)
 	$(RUN)/python -m pytest -m "validation and not long" $(SIDE_BY_SIDE)

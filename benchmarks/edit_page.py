@@ -22,7 +22,7 @@ from exugear.gearbox.templates.kinds import KINDS, template
 
 PAGE = ROOT / "docs" / "howto" / "editor_in_the_browser.md"
 MARKS = ("<!-- figures of benchmarks/edit_page.py -->", "<!-- end of figures -->")
-STEPS = {"check": "errors, kinematics", "dynamics": "modes, Campbell diagram", "picture": "picture", "loads": "loads"}
+STEPS = {"check": "errors, kinematics", "picture": "picture", "dynamics": "modes, Campbell diagram", "loads": "loads"}
 ROUNDS = 7
 #: Notes when a key is pressed, and when each part is no longer grey.
 WATCH = """() => {
@@ -100,7 +100,8 @@ def main() -> None:
             print(lines[-1], flush=True)
     about = machine()
     where = f"{about['cores']} cores ({about['processor']}) without graphics card"
-    told = [f"Medians of {ROUNDS} key strokes on {where}.", f"Load average at the start: {before}."]
+    others = ": other programs were using the machine" if before > 1.0 else ""
+    told = [f"Medians of {ROUNDS} key strokes on {where}.", f"Load average at the start: {before}{others}."]
     text = "\n".join([*lines, "", *told])
     print(text)
     if wanted.write:

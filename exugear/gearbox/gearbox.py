@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from exugear.gearbox import body_parts, gear_parts
 from exugear.gearbox.checks import ALONE, CHECKS, Check, Element, bodies_apart
@@ -32,6 +32,7 @@ from exugear.gearbox.parts import (
     VaryingLoad,
     WheelDeviation,
     connector_matrix,
+    draw_side_view,
 )
 from exugear.gearbox.reading import GearboxFileError, Origin, parse_case, read_toml, readable, shortened
 from exugear.gearbox.sections.case import NAMED_TABLES, GearboxFile, SteSection, labels_in_use
@@ -42,6 +43,10 @@ from fe_ste.flanks import FlankModification
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.standards import iso6336
 from fe_ste.tools.display import ReprMixin, TitledRows
+from fe_ste.tools.drawing import axes_or_new
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 BESIDE_EQUATIONS = (
     "labels",
@@ -243,6 +248,23 @@ class Gearbox(ReprMixin):
             "load cases": ", ".join(self.load_cases),
             "warnings": str(len(self.warnings)),
         }
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw gears, shafts and bearings to scale, seen across the plane in which the axes are farthest apart.
+
+        Parameters
+        ----------
+        ax : matplotlib axes; by default new ones, whose ``ax.figure`` can be shown and saved
+
+        Examples
+        --------
+        >>> ax = Gearbox.from_toml("cases/grc750/gearbox.toml").plot()
+        >>> ax.get_xlabel(), [text.get_text() for text in ax.texts]
+        ('z / mm', ['housing', 'carrier', 'planet', 'lss', 'ims', 'hss'])
+        """
+        with axes_or_new(ax, 7.2, 4.0) as panel:
+            draw_side_view(panel, self.bodies(), self.gears, self.bearings)
+            return panel
 
     # -- bodies ------------------------------------------------------------------------------------------
 

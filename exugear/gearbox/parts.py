@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
 from exugear.gearbox.sections.connections import CatalogueSection, ConnectorDampingSection, StiffnessSection
 from exugear.gearbox.units import RPM
 from fe_ste.flanks import FlankModification
-from fe_ste.geometry.gears import GearPair
+from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin, TitledRows, value_range
+from fe_ste.tools.drawing import COLOURS, drawable
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True)
@@ -375,3 +379,44 @@ def seat_key(body: str, item: str) -> str:
 def node_position(body: Body) -> Floats:
     """Position of the node of a body at zero angles, which is its centre of mass, m."""
     return np.array([*body.axis, body.centre_of_mass_z])
+
+
+def draw_side_view(panel: Axes, bodies: Sequence[Body], gears: Mapping[str, Gear], bearings: Sequence[Bearing]) -> None:
+    """Draw gears as rectangles, shafts as lines and bearings as crosses, to scale in mm.
+
+    Axes are seen across the plane in which they are farthest apart. Planets of a set have one colour and label.
+    """
+    axes = np.array([body.axis for body in bodies])
+    direction = np.linalg.svd(axes - axes.mean(axis=0))[2][0]
+    direction *= np.sign(direction[np.argmax(np.abs(direction))])
+    families = list(dict.fromkeys(body.family for body in bodies))
+    labelled: set[str] = set()
+    for body in bodies:
+        colour = COLOURS[families.index(body.family) % len(COLOURS)]
+        height = 1e3 * float(direction @ body.axis)
+        seats = [1e3 * bearing.position[2] for bearing in bearings if bearing.body == body.name]
+        reach = list(seats)
+        beside = height
+        for name, z in body.wheels.items():
+            gear = gears[name]
+            half = 500.0 * gear.face_width
+            reach += [1e3 * z - half, 1e3 * z + half]
+            radii = sorted((1e3 * gear.tip_radius, 500.0 * gear.held_diameter))
+            spans = [(-radii[1], radii[1])]
+            if gear.internal:
+                spans = [(-radii[1], -radii[0]), (radii[0], radii[1])]
+                beside = height + radii[0]
+            for low, high in spans:
+                corners = ([1e3 * z - half, 1e3 * z + half], [height + low] * 2, [height + high] * 2)
+                panel.fill_between(*corners, facecolor=colour, edgecolor=colour, alpha=0.35)
+        if not reach:
+            continue
+        if beside == height:
+            panel.plot([min(reach), max(reach)], [height] * 2, color=colour)
+        panel.plot(seats, [height] * len(seats), color=colour, linestyle="none", marker="x", markersize=7.0)
+        if body.family not in labelled:
+            labelled.add(body.family)
+            label = drawable(body.family)
+            panel.annotate(label, (max(reach), beside), (4, 3), textcoords="offset points", color=colour)
+    panel.set_aspect("equal", adjustable="datalim")
+    panel.set(xlabel="z / mm", ylabel="Across the axes / mm")

@@ -8,7 +8,7 @@ import logging
 import math
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -40,10 +40,14 @@ def keep_case(gearbox: Gearbox, folder: Path) -> None:
 def stored_source(folder: Path) -> Path | None:
     """Return the path of the gearbox file that the results in a folder belong to; None without one that can be read."""
     try:
-        kept = json.loads(read_text(folder / CASE_FILE))
-        return Path(kept["source"])
+        return Path(json.loads(read_text(folder / CASE_FILE))["source"])
     except (FileError, ValueError, KeyError, TypeError, RecursionError):
         return None
+
+
+def content_digest(content: Mapping[str, Any]) -> str:
+    """Return a digest of the content of a gearbox file, independent of its formatting."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def _checksum(kept: dict[str, Any]) -> str:
@@ -110,6 +114,8 @@ class StepTiming:
     """Wall-clock time, s."""
     memory: float
     """Peak memory of the process, bytes."""
+    content: str = ""
+    """Digest of the content of the gearbox file for which it was completed; empty if unknown."""
 
 
 def peak_memory() -> float:
@@ -124,7 +130,11 @@ def peak_memory() -> float:
 
 def note_time(folder: Path, step: str, seconds: float) -> None:
     """Append a line to the list of run times in the folder; several processes may do so concurrently."""
-    append_line(folder / TIMES_FILE, json.dumps(asdict(StepTiming(step, round(seconds, 2), peak_memory()))))
+    try:
+        content = content_digest(json.loads(read_text(folder / CASE_FILE))["content"])
+    except (FileError, ValueError, KeyError, TypeError, RecursionError):
+        content = ""
+    append_line(folder / TIMES_FILE, json.dumps(asdict(StepTiming(step, round(seconds, 2), peak_memory(), content))))
 
 
 @contextmanager
@@ -155,8 +165,9 @@ def _lines(path: Path) -> Iterator[StepTiming]:
     for line in lines:
         try:
             values: dict[str, Any] = json.loads(line)
-            spent = StepTiming(str(values["step"]), float(values["seconds"]), float(values["memory"]))
-        except (ValueError, KeyError, TypeError, RecursionError, OverflowError):
+            numbers = (float(values["seconds"]), float(values["memory"]))
+            spent = StepTiming(str(values["step"]), *numbers, str(values.get("content", "")))
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError, OverflowError):
             continue  # a line truncated by a killed process contains no entry
         if math.isfinite(spent.seconds):
             yield spent
@@ -207,8 +218,7 @@ def read_content(gearbox: Gearbox, of_life: bool) -> dict[str, Any]:
 
 def case_digest(gearbox: Gearbox, of_life: bool = False) -> str:
     """Hash of all content of a gearbox file on which the outputs of a study depend."""
-    content = read_content(gearbox, of_life)
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    return content_digest(read_content(gearbox, of_life))
 
 
 def stored_studies(folder: Path, gearbox: Gearbox) -> Iterator[StoredStudy]:

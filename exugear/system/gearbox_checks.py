@@ -63,7 +63,9 @@ def free_motion(gearbox: Gearbox, variant: str) -> str:
     if not rows.size:
         return "no bearing supports a body"
     # Each row of one length: how stiff a support is does not matter, only that it holds.
-    _, singular, basis = np.linalg.svd(rows / np.linalg.norm(rows, axis=1, keepdims=True))
+    # The triangle has the same singular values and right vectors as the rows, of which there are many more.
+    triangle = np.linalg.qr(rows / np.linalg.norm(rows, axis=1, keepdims=True), mode="r")
+    _, singular, basis = np.linalg.svd(triangle)
     free = basis[int(np.sum(singular > FREE_STRETCH * singular[0])) :]
     rolling = _rolling_motions(gearbox, moving, starts)
     beyond = free - free @ rolling.T @ rolling

@@ -72,7 +72,9 @@ def with_modal_damping(assembly: Assembly, percent: float | None = None) -> Asse
     rolling = np.array([assembly.rolling_velocity(still, speed) for speed in speeds]).T
     carried = linear.mass @ rolling
     columns -= carried @ np.linalg.solve(rolling.T @ carried, rolling.T @ columns)
-    return replace(assembly, modal=_arrays(assembly, columns))
+    result = replace(assembly, modal=_arrays(assembly, columns))
+    result.known_rest.append(q)  # nothing is damped at rest
+    return result
 
 
 def with_damping_times(gearbox: Gearbox) -> Gearbox:

@@ -95,15 +95,18 @@ def linearise_at_static_load(assembly: Assembly) -> Assembly:
     q, searched = _loaded_state(assembly, near)
     nominal = _points(assembly, searched, assembly.support_strains(q))
     resting, laws = _resting(assembly, nominal)
-    here, over_turns = _states(resting, laws, q)
-    moving, spread = _lasting_laws(resting, laws, here, over_turns)
-    return replace(
+    q = _balance(resting, laws, near=q)
+    here = _state(resting, laws, q)
+    moving, spread = _lasting_laws(resting, laws, here, _states_over_turns(resting, laws, here))
+    linearised = replace(
         resting,
         connectors=moving,
         connectors_at_rest=resting.connectors,
         operating_points=here.points,
         planet_spread=spread,
     )
+    linearised.known_rest.append(q)
+    return linearised
 
 
 def _with_contacts(assembly: Assembly) -> tuple[Assembly, Floats | None]:
@@ -239,11 +242,10 @@ def _state(assembly: Assembly, laws: Sequence[SupportLaw], q: Floats) -> _Suppor
     return _SupportState(strain, assembly.support_loads_at_rest(q), _points(assembly, laws, strain))
 
 
-def _states(
-    assembly: Assembly, laws: Sequence[SupportLaw], near: Floats
-) -> tuple[_SupportState, dict[str, list[_SupportState]]]:
-    """State at the angles zero, from a state that is near it; those over the turn of carriers with unequal planets."""
-    here = _state(assembly, laws, _balance(assembly, laws, near=near))
+def _states_over_turns(
+    assembly: Assembly, laws: Sequence[SupportLaw], here: _SupportState
+) -> dict[str, list[_SupportState]]:
+    """States over the turn of each carrier with unequal planets, from that at the angles zero."""
     over_turns: dict[str, list[_SupportState]] = {}
     equal = _equal(assembly)
     unequal = [planets for planets in planet_families(assembly.bodies) if planets not in equal]
@@ -252,7 +254,7 @@ def _states(
         for turn in 2.0 * math.pi / CARRIER_ANGLES * np.arange(1, CARRIER_ANGLES):
             about = rolled_coordinates(assembly, carrier, float(turn))
             over_turns[carrier].append(_state(assembly, laws, _balance(assembly, laws, about)))
-    return here, over_turns
+    return over_turns
 
 
 def _lasting_laws(

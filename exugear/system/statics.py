@@ -102,11 +102,9 @@ def tangent_stiffness(assembly: Assembly, q: Floats, meshes: MeshArrays) -> Floa
 
     The sum over the elements of `linearise`, where no single one is asked for: a tenth of its time with elastic bodies.
     """
-    size = assembly.size
     rest = np.zeros(assembly.size)
     stiffness = -assembly.mesh_jacobians(q, rest, meshes)[0]
-    damping = np.zeros((size, size))
-    add_connector_tangents(q, _connector_steps(assembly), assembly.connectors, stiffness, damping)
+    add_connector_tangents(q, _connector_steps(assembly), assembly.connectors, stiffness)
     for i, (first, second) in enumerate(assembly.springs.coordinates):
         for one, other in ((first, second), (second, first)):
             stiffness[one, one] += assembly.springs.stiffness[i]
@@ -463,8 +461,10 @@ def static_state(assembly: Assembly) -> StaticState:
     """
     gearbox = assembly.gearbox
     resting = assembly.at_rest
-    torques = gearbox.case.static_load.torques_N_m
-    return StaticState(resting, locked_equilibrium(resting, torques, gearbox.locked, resting.mean_meshes))
+    if not assembly.known_rest:
+        torques = gearbox.case.static_load.torques_N_m
+        assembly.known_rest.append(locked_equilibrium(resting, torques, gearbox.locked, resting.mean_meshes))
+    return StaticState(resting, assembly.known_rest[0].copy())
 
 
 def meshes_near_unconverged(assembly: Assembly) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -110,6 +110,8 @@ class Assembly(ReprMixin):
     """Modal damping, where the file states it."""
     planet_spread: float = 0.0
     """Largest change of stiffness that made bearings of equal planets equal, over that stiffness."""
+    known_rest: list[Floats] = field(default_factory=list, init=False, repr=False, compare=False)
+    """Coordinates (size,) under the static load once they are known, otherwise empty, as in copies by `replace`."""
 
     def _line(self) -> str:
         choice = f"{self.variant}, {self.mesh_model}, {self.inertias}"

@@ -28,6 +28,7 @@ from __future__ import annotations
 import hashlib
 import struct
 import threading
+from functools import cache
 from typing import Any, TypeVar, cast
 
 import numba
@@ -124,10 +125,26 @@ class _BundleType(types.Type):
 
 
 def _type_of(value: Any) -> Any:
-    if not isinstance(value, tuple):
-        return numba.typeof(value)  # type: ignore[no-untyped-call]
-    named: Any = value
-    return _BundleType(type(value).__name__, {f: _type_of(v) for f, v in zip(named._fields, value, strict=True)})
+    if isinstance(value, tuple):
+        return _bundle_type(type(value), tuple(map(_type_of, value)))
+    if isinstance(value, np.ndarray) and value.flags.c_contiguous:
+        return _array_type(value.dtype, value.ndim, value.flags.writeable)
+    return numba.typeof(value)  # type: ignore[no-untyped-call]
+
+
+# numba takes longer to find these types than many compiled functions run.
+
+
+@cache
+def _bundle_type(of: Any, kinds: tuple[Any, ...]) -> _BundleType:
+    return _BundleType(of.__name__, dict(zip(of._fields, kinds, strict=True)))
+
+
+@cache
+def _array_type(dtype: np.dtype[Any], ndim: int, writeable: bool) -> Any:
+    example = np.empty((1,) * ndim, dtype)
+    example.flags.writeable = writeable
+    return numba.typeof(example)  # type: ignore[no-untyped-call]
 
 
 def _size_of(kind: Any) -> int:

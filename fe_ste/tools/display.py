@@ -1,4 +1,4 @@
-"""How objects show themselves: a line of text, a small HTML table in a notebook, ranges of values with their unit."""
+"""How objects show themselves: a line of text, table and diagram in a notebook, ranges of values with their unit."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
+
+from fe_ste.tools.drawing import inline_picture
 
 TitledRows = tuple[str, Mapping[str, str]]
 """Title of a table, and name of each entry -> its value as text, with its unit."""
@@ -30,9 +32,10 @@ class _AttributeFormatter(Formatter):
 
 
 class ReprMixin:
-    """Mixin that displays an object as one line of text, and in a notebook as a small table.
+    """Mixin that displays an object as one line of text, and in a notebook as a small table and its diagram.
 
-    A class states its line, or computes it in `_line`; one with a table gives its title and rows in `_table`.
+    A class states its line, or computes it in `_line`; one with a table gives its title and rows in `_table`. The
+    diagram is that of a method `plot` without arguments. A result that cannot be drawn says so below its table.
 
     Parameters
     ----------
@@ -67,9 +70,14 @@ class ReprMixin:
 
     def _repr_html_(self) -> str:
         title, rows = self._table()
-        if rows:
-            return html_table(title, rows)
-        return f"<p>{_shown(repr(self))}</p>"
+        text = html_table(title, rows) if rows else f"<p>{_shown(repr(self))}</p>"
+        plot = getattr(self, "plot", None)
+        if plot is None:
+            return text
+        try:
+            return f"{text}{inline_picture(plot().figure, type(self).__name__)}"
+        except Exception as error:  # whatever a picture meets, the text is shown
+            return f"{text}<p>{_shown(f'No diagram: {error}')}</p>"
 
     def _line(self) -> str:
         return _AttributeFormatter(self).format(self._stated_line)

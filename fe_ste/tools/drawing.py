@@ -14,8 +14,10 @@ import io
 import math
 import subprocess
 import sys
+from base64 import b64encode
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from unicodedata import category
@@ -37,8 +39,9 @@ WARNING_COLOUR = "#D0021B"
 DASHES: tuple[Any, ...] = ("-", (0, (6, 2)), (0, (2, 1.5)), (0, (6, 1.5, 1.5, 1.5)))
 #: Width of a picture in one and in two columns of a paper, inches (about 89 and 183 mm).
 COLUMN_WIDTHS = {1: 3.5, 2: 7.2}
-#: Points of an inch that files of pictures have.
+#: Points of an inch that files of pictures have, and pictures inside of a notebook.
 _DPI = 200
+_INLINE_DPI = 90
 
 
 @contextmanager
@@ -197,19 +200,26 @@ def finish_figure(figure: Figure, path: str | Path | None) -> Figure:
         path = Path(path)
         content = io.BytesIO()
         if path.suffix == ".png":
-            _print_png(figure, content)
+            _print_png(figure, content, _DPI)
         else:
             figure.savefig(content, format=path.suffix.removeprefix(".") or None, dpi=_DPI)
         write_file(path, content.getvalue())
     return figure
 
 
-def _print_png(figure: Figure, content: io.BytesIO) -> None:
+def inline_picture(figure: Figure, name: str) -> str:
+    """Return a diagram as an HTML image that contains its PNG; `name` is its alternative text."""
+    content = io.BytesIO()
+    _print_png(finish_figure(figure, None), content, _INLINE_DPI)
+    return f'<img alt="{escape(name)}" src="data:image/png;base64,{b64encode(content.getvalue()).decode("ascii")}">'
+
+
+def _print_png(figure: Figure, content: io.BytesIO, dpi: int) -> None:
     """Save a diagram as `savefig` does, which draws everything twice, the first time only for the layout."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     before = figure.get_dpi()
-    figure.set_dpi(_DPI)
+    figure.set_dpi(dpi)
     try:
         canvas: Any = FigureCanvasAgg(figure)
         canvas.print_png(content)

@@ -1,4 +1,4 @@
-"""Results of the text of a gearbox file, step by step: errors and kinematics, modes, picture, static loads.
+"""Results of the text of a gearbox file, step by step: errors and kinematics, picture, modes, static loads.
 
 Mesh stiffness is that of ISO 6336-1 and bodies are rigid, so that no finite elements are needed. Nothing is written.
 """
@@ -30,7 +30,7 @@ from exugear.gearbox.variant import Variant
 from exugear.report.findings.words import Labels
 from exugear.report.pictures.shapes import TriangleSurface
 from exugear.report.web.document import ArrayStore, rounded, rounded_list
-from exugear.report.web.stage import DrawnBody, bodies_data, drawn_bodies, motions_data
+from exugear.report.web.stage import DrawnBody, bodies_data, motions_data, rigid_bodies
 from exugear.results.folder import duty_summary
 from exugear.system.gearbox_checks import gearbox_warnings, lacking, usual_variant
 from exugear.system.modes import CampbellDiagram, Modes, modes_of, unusual_damping
@@ -98,6 +98,7 @@ class Analyst:
         self._lock = threading.Lock()
         self._kept: dict[str, list[dict[str, Any]]] = {}
         self._latest: dict[str, object] = {}
+        self._picture: dict[str, Any] = {"geometry": ""}
 
     def steps(self, text: str, tab: str = "", geometry: str = "") -> Generator[dict[str, Any]]:
         """Yield the results of a text step by step; a newer request of the same tab ends an older one.
@@ -110,7 +111,7 @@ class Analyst:
         Yields
         ------
         dict
-            For JSON, with the key ``step``: ``check``, ``dynamics``, ``picture`` and ``loads``, or ``superseded``.
+            For JSON, with the key ``step``: ``check``, ``picture``, ``dynamics`` and ``loads``, or ``superseded``.
         """
         request = self.ask(tab)
         digest = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
@@ -127,7 +128,7 @@ class Analyst:
                     break
                 done.append(step)
                 if step["step"] == "picture" and step["geometry"] == geometry:
-                    step = {**step, "arrays": {key: step["arrays"][key] for key in step["moving"]}}
+                    step = {**step, "arrays": {}}
                 yield step
             self._kept[digest] = done
             while len(self._kept) > KEPT:
@@ -145,11 +146,13 @@ class Analyst:
             return
         try:
             with model_errors():
+                bodies = rigid_bodies(checked.gearbox)
+                yield self._pictured(bodies, Labels(checked.gearbox).labels)
                 variant = usual_variant(checked.gearbox)
                 assembly = assembled_by_iso(checked.gearbox, variant)
                 modes = modes_of(assembly)
-                yield {"step": "dynamics", **dynamics(modes), "remarks": self._warnings([unusual_damping(modes)], text)}
-                yield {"step": "picture", **picture(assembly, modes)}
+                warnings = self._warnings([unusual_damping(modes)], text)
+                yield {"step": "dynamics", **dynamics(modes), **motions(modes, bodies), "remarks": warnings}
                 tables, remarks = loads(assembly)
                 unavailable = "" if assembly.variant.has_bearings else lacking(checked.gearbox, Variant.bushing)
                 warnings = self._warnings(remarks, text)
@@ -157,6 +160,15 @@ class Analyst:
         except (BadInputError, FailedError) as error:
             errors = placed(str(error).splitlines(), "error", self._source, text)
             yield {"step": "dynamics", "failed": True, "remarks": [asdict(remark) for remark in errors]}
+
+    def _pictured(self, bodies: tuple[DrawnBody, ...], labels: Mapping[str, str]) -> dict[str, Any]:
+        """Return the step ``picture``; most changes of a text leave it as it was."""
+        geometry = _digest(bodies, labels)
+        if self._picture["geometry"] != geometry:
+            arrays = ArrayStore(f"{geometry}-", level=1)
+            stage = bodies_data(bodies, labels, arrays)
+            self._picture = {"step": "picture", "geometry": geometry, "stage": stage, "arrays": arrays.packed()}
+        return self._picture
 
     def _warnings(self, lines: Iterable[str], text: str) -> list[dict[str, Any]]:
         """Return warnings about the text for JSON, without empty and repeated ones."""
@@ -328,21 +340,12 @@ def campbell(modes: Modes, diagram: CampbellDiagram) -> dict[str, Any]:
     }
 
 
-def picture(assembly: Assembly, modes: Modes) -> dict[str, Any]:
-    """Return bodies and modes for the 3-D view; equal bodies have the same name ``geometry``."""
-    bodies = drawn_bodies(assembly)
-    words = Labels(assembly.gearbox)
-    geometry = _digest(bodies, words.labels)
-    fixed = ArrayStore(f"{geometry}-", level=1)
+def motions(modes: Modes, bodies: tuple[DrawnBody, ...]) -> dict[str, Any]:
+    """Return how the bodies of the picture move in all modes."""
     shapes = hashlib.sha256(np.ascontiguousarray(modes.shapes).tobytes()).hexdigest()[:16]
-    moving = ArrayStore(f"{shapes}-", level=1)
-    motions = motions_data(assembly, tuple(map(_thinned, bodies)), modes.shapes, moving)
-    return {
-        "geometry": geometry,
-        "stage": {**bodies_data(bodies, words.labels, fixed), **motions},
-        "arrays": {**fixed.packed(), **moving.packed()},
-        "moving": list(moving.packed()),
-    }
+    arrays = ArrayStore(f"{shapes}-", level=1)
+    stage = motions_data(modes.assembly, tuple(map(_thinned, bodies)), modes.shapes, arrays)
+    return {"stage": stage, "arrays": arrays.packed()}
 
 
 def _digest(bodies: Iterable[DrawnBody], labels: Mapping[str, str]) -> str:

@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import tomllib
 from pathlib import Path
 from typing import Any
 
 from exugear.gearbox.named_files import LARGEST_CASE, LARGEST_MATRICES, NamedFileError, check_regular
 from exugear.gearbox.reading import GearboxFileError, read_text
-from exugear.results.folder import CASE_FILE, REPORT_FILE
+from exugear.results.folder import REPORT_FILE, content_digest, times_spent
 from fe_ste.tools.files import write_file
 
+STEPS_OF_RESULTS = {
+    "tables": ("tables", "steady"),
+    "steady": ("steady",),
+    "report": ("report",),
+    "changes": ("design changes",),
+}
+"""Beginnings of the steps, as the commands note them, after which each kind of results is complete.
+
+A steady-state response reads tables that fit, and computes the others."""
 UNSAVED_FILE = "unsaved.toml"
 """Text of the page that was not saved when the server ended, in the results folder."""
 
@@ -43,9 +51,9 @@ class EditedFile:
             return ""
 
     def told(self) -> dict[str, Any]:
-        """Return digest and state of the file, and what its results folder has: a report, and whether it is current."""
+        """Return digest and state of the file, and of what kinds of results its folder has those of which state."""
         text = self.text()
-        return {"digest": digest_of(text), "missing": not self.case.is_file(), "report": self._report_state(text)}
+        return {"digest": digest_of(text), "missing": not self.case.is_file(), "results": self._results(text)}
 
     def save(self, text: str, digest: str) -> None:
         """Write the file, whose content the page knows by its digest; line ends stay those of the file.
@@ -84,21 +92,19 @@ class EditedFile:
         except (NamedFileError, OSError):
             return None
 
-    def _report_state(self, text: str) -> str:
-        """Return "none", "current" for a report of results of this text, or "old"."""
-        report = self.folder / REPORT_FILE
+    def _results(self, text: str) -> dict[str, str]:
+        """Return "current" for each kind of results that was completed for this text, "old" for others that exist."""
         try:
-            written = report.stat().st_mtime
-        except OSError:
-            return "none"
-        try:
-            kept = self.folder / CASE_FILE
-            same = json.loads(kept.read_text(encoding="utf-8"))["content"] == json.loads(
-                json.dumps(tomllib.loads(text), default=str)
-            )
-            return "current" if same and written >= kept.stat().st_mtime else "old"
-        except (OSError, ValueError, KeyError, TypeError, RecursionError):
-            return "old"
+            content = content_digest(tomllib.loads(text))
+        except (ValueError, TypeError, RecursionError):  # no TOML, or a date
+            content = ""
+        spent = times_spent(self.folder)
+        states: dict[str, str] = {}
+        for kind, steps in STEPS_OF_RESULTS.items():
+            digests = [own.content for own in spent if own.step.startswith(steps)]
+            if digests and (kind != "report" or (self.folder / REPORT_FILE).is_file()):
+                states[kind] = "current" if content and content in digests else "old"
+        return states
 
 
 def digest_of(text: str) -> str:

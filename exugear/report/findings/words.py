@@ -229,7 +229,7 @@ class Labels:
 
     def kinetic_energy(self, modes: xr.Dataset, index: int) -> dict[tuple[str, str], float]:
         """Return fractions of the kinetic energy by body label and motion; planets are summed."""
-        kinetic = modes["kinetic_energy_share"].isel(mode=index).to_numpy()
+        kinetic = modes["kinetic_energy_share"].to_numpy()[index]
         carried = {body.name for body in self._gearbox.bodies() if body.carrier}
         shares: dict[tuple[str, str], float] = {}
         for body, of_body in zip(modes["body"].to_numpy(), kinetic, strict=True):
@@ -252,7 +252,7 @@ class Labels:
 
     def strain_energy(self, modes: xr.Dataset, index: int) -> dict[str, float]:
         """Return fractions of the strain energy by element label, largest first; members of a planet set are summed."""
-        shares = modes["strain_energy_share"].isel(mode=index).to_numpy()
+        shares = modes["strain_energy_share"].to_numpy()[index]
         return self.gathered(dict(zip(element_words(modes), map(float, shares), strict=True)))
 
     def gathered(self, shares: Mapping[str, float]) -> dict[str, float]:

@@ -321,13 +321,21 @@ def displacement_of(body: BodyShape, motion: ArrayLike) -> Floats:
     -------
     (n, 3) m
     """
-    small = np.asarray(motion, dtype=np.float64)
-    return small[:3] + np.cross(small[3:], body.surface.points - body.reference)
+    return np.asarray(_displaced(body, np.asarray(motion, dtype=np.float64)))
+
+
+def _displaced(body: BodyShape, motion: Floats | Complexes) -> Floats | Complexes:
+    """Return the displacement (n, 3) of each point for a real or complex motion (6,)."""
+    a, b, c = motion[3:]
+    # The vector product with the rotations as a matrix: np.cross takes ten times as long for few points.
+    turning = np.array([[0.0, c, -b], [-c, 0.0, a], [b, -a, 0.0]])
+    displacement: Floats | Complexes = motion[:3] + (body.surface.points - body.reference) @ turning
+    return displacement
 
 
 def vibration_of(body: BodyShape, motion: Complexes) -> Complexes:
     """Return the complex displacement amplitude (n, 3) of each point of a body from that of its motion (6,)."""
-    return displacement_of(body, motion.real) + 1j * displacement_of(body, motion.imag)
+    return np.asarray(_displaced(body, motion), dtype=np.complex128)
 
 
 def peak_displacement(vibration: Complexes) -> Floats:

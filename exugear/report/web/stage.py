@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import seat_key
 from exugear.report.pictures.scene import DISPLACEMENT_COLOURS, body_colours
 from exugear.report.pictures.shapes import (
@@ -47,14 +48,17 @@ class DrawnBody:
 
 def drawn_bodies(assembly: Assembly) -> tuple[DrawnBody, ...]:
     """List all bodies of a gearbox that have a shape to draw, with their colours from the pictures."""
-    shapes = bodies_of(assembly.gearbox)
-    colours = {family: _written(colour) for family, colour in body_colours(shapes).items()}
-    rigid = [
-        DrawnBody(shape, colours[shape.family], shape.name)
-        for shape in shapes
-        if shape.name not in assembly.elastic_bodies
-    ]
+    bodies = rigid_bodies(assembly.gearbox)
+    colours = {body.shape.family: body.colour for body in bodies}
+    rigid = (body for body in bodies if body.owner not in assembly.elastic_bodies)
     return (*rigid, *_elastic(assembly, colours))
+
+
+def rigid_bodies(gearbox: Gearbox) -> tuple[DrawnBody, ...]:
+    """List all bodies of a gearbox that have a shape to draw, as rigid ones."""
+    shapes = bodies_of(gearbox)
+    colours = body_colours(shapes)
+    return tuple(DrawnBody(shape, _written(colours[shape.family]), shape.name) for shape in shapes)
 
 
 def _elastic(assembly: Assembly, colours: dict[str, str]) -> list[DrawnBody]:

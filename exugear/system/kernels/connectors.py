@@ -262,7 +262,7 @@ def rolling_pushes(q: Floats, connectors: ConnectorArrays) -> Floats:
 
 
 def add_connector_tangents(
-    q: Floats, steps: Floats, connectors: ConnectorArrays, stiffness: Floats, damping: Floats
+    q: Floats, steps: Floats, connectors: ConnectorArrays, stiffness: Floats, damping: Floats | None = None
 ) -> None:
     """Add minus the derivatives (size, size) of the connectors' forces to coordinates q and to velocities, at rest.
 
@@ -271,6 +271,7 @@ def add_connector_tangents(
     Parameters
     ----------
     steps : (c,) of the differences, m or rad, and per second; connectors with 0 are left out
+    damping : None if the derivatives to velocities are not required
     """
     numbers = np.flatnonzero(steps)
     if not numbers.size:
@@ -283,6 +284,8 @@ def add_connector_tangents(
     ways = ways.reshape(ends, 2, -1, 2, BODY_SIZE)
     rest = _local(q, places).reshape(-1, 2, BODY_SIZE)
     for total, (x, u) in ((stiffness, (rest + ways, 0.0 * ways)), (damping, (rest + 0.0 * ways, ways))):
+        if total is None:
+            continue
         moved, load, _ = _loads(x, u, chosen)
         forces = _forces(x, moved, load).reshape(ends, 2, -1, ends)
         slopes = (forces[:, 1] - forces[:, 0]) / (2.0 * steps[numbers, None])

@@ -18,7 +18,7 @@ from exugear.system.modes import modes_of
 from exugear.system.statics import static_state
 
 PAIR = template("pair")
-LINES = PAIR.split("\n")
+STEPS = ["check", "picture", "dynamics", "loads"]
 
 
 def line_of(text: str, words: str) -> int:
@@ -97,7 +97,6 @@ def test_a_message_without_a_place_is_about_the_whole_file():
 
 def test_the_numbers_are_those_of_the_commands():
     steps = steps_of(PAIR)
-    assert list(steps) == ["check", "dynamics", "picture", "loads"]
     assembly = assembled_by_iso(Gearbox.from_dict(tomllib.loads(PAIR)), Variant.bushing)
     modes = modes_of(assembly)
     rows = steps["dynamics"]["tables"]["modes"]["rows"]
@@ -123,12 +122,23 @@ def test_bodies_are_sent_once_and_again_after_their_shape_has_changed():
     first = pictured(analyst.steps(PAIR))
     softer = pictured(analyst.steps(PAIR.replace("factor = 0.5", "factor = 0.4"), geometry=first["geometry"]))
     assert softer["geometry"] == first["geometry"]
-    assert set(softer["arrays"]) == set(softer["moving"])
+    assert softer["arrays"] == {}
     wide = PAIR.replace("face_width_mm = 42.0", "face_width_mm = 44.0")
     wider = pictured(analyst.steps(wide, geometry=first["geometry"]))
     assert wider["geometry"] != first["geometry"]
-    assert set(wider["arrays"]) > set(wider["moving"])
+    assert {body[part]["blob"] for body in wider["stage"]["bodies"] for part in ("points", "triangles")} == set(
+        wider["arrays"]
+    )
     assert pictured(analyst.steps(PAIR)) == first
+
+
+def test_the_picture_waits_for_no_balance_and_no_modes(monkeypatch):
+    def fail(*_):
+        raise AssertionError("the picture waits for modes")
+
+    monkeypatch.setattr("exugear.cli.edit.state.assembled_by_iso", fail)
+    steps = Analyst("pair.toml").steps(PAIR)
+    assert [next(steps)["step"], next(steps)["step"]] == STEPS[:2]
 
 
 def test_a_newer_request_of_the_same_tab_ends_an_older_one():
@@ -137,7 +147,7 @@ def test_a_newer_request_of_the_same_tab_ends_an_older_one():
     assert next(older)["step"] == "check"
     analyst.ask("a")
     assert [step["step"] for step in older] == ["superseded"]
-    assert [step["step"] for step in analyst.steps(PAIR, "b")] == ["check", "dynamics", "picture", "loads"]
+    assert [step["step"] for step in analyst.steps(PAIR, "b")] == STEPS
 
 
 def test_a_gearbox_without_bearings_says_what_is_missing():

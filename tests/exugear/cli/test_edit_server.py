@@ -20,7 +20,7 @@ from exugear.cli.edit.stored import UNSAVED_FILE, EditedFile, FileConflictError,
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import read_toml
 from exugear.gearbox.templates.kinds import template
-from exugear.results.folder import REPORT_FILE, keep_case
+from exugear.results.folder import REPORT_FILE, keep_case, note_time
 
 PAIR = template("pair")
 JSON = {"Content-Type": "application/json"}
@@ -95,7 +95,7 @@ def test_the_own_origin_is_answered_also_by_name(server):
         assert ask(server, own(server, "cancel"), {}, headers=given)[0] == 200
 
 
-@pytest.mark.parametrize("path", ["/", "/file", "/wrong/file", "//", "/{token}x/file", "/{token}", "/%2e%2e/", "*"])
+@pytest.mark.parametrize("path", ["/", "/file", "/wrong/file", "//", "/{token}~/file", "/{token}", "/%2e%2e/", "*"])
 def test_without_the_token_there_is_nothing(server, path):
     status, content, _ = ask(server, path.replace("{token}", server.token[:-1]))
     assert status == 404
@@ -217,18 +217,31 @@ def test_unsaved_text_is_kept_at_the_end(tmp_path):
     assert case.read_text() == PAIR
 
 
-def test_a_report_is_current_only_for_the_text_of_its_results(tmp_path):
+def test_stored_results_are_current_only_for_the_content_that_they_were_completed_for(tmp_path):
     case = tmp_path / "pair.toml"
     case.write_text(PAIR)
     file = EditedFile(case, tmp_path)
-    assert file.told()["report"] == "none"
-    keep_case(Gearbox.from_dict(read_toml(case), str(case)), tmp_path)
+
+    def complete(*steps: str) -> None:
+        keep_case(Gearbox.from_dict(read_toml(case), str(case)), tmp_path)
+        for step in steps:
+            note_time(tmp_path, step, 1.0)
+
+    assert file.told()["results"] == {}
+    complete("steady, bushing, discs, line_of_action", "report")
+    assert file.told()["results"] == {"tables": "current", "steady": "current"}  # the page itself was deleted
     (tmp_path / REPORT_FILE).write_text("report")
-    assert file.told()["report"] == "current"
+    assert file.told()["results"]["report"] == "current"
     case.write_text(PAIR + "# a comment changes nothing\n")
-    assert file.told()["report"] == "current"
+    assert set(file.told()["results"].values()) == {"current"}
     case.write_text(PAIR.replace("factor = 0.5", "factor = 0.4"))
-    assert file.told()["report"] == "old"
+    assert set(file.told()["results"].values()) == {"old"}
+    complete("tables of transmission error")
+    assert file.told()["results"] == {"tables": "current", "steady": "old", "report": "old"}
+    case.write_text("a = [")
+    assert set(file.told()["results"].values()) == {"old"}
+    case.write_text(PAIR)
+    assert file.told()["results"] == {"tables": "current", "steady": "current", "report": "current"}
 
 
 @pytest.mark.validation
@@ -240,7 +253,7 @@ def test_steady_response_and_report_are_computed_one_after_the_other(server):
         assert ask(server, own(server, "poll"))[0] == 200
     told = server.work.told()
     assert (told["state"], told["digest"]) == ("done", digest_of(PAIR)), told["lines"]
-    assert server.file.told()["report"] == "current"
+    assert server.file.told()["results"] == {"tables": "current", "steady": "current", "report": "current"}
     assert b"helical gear pair" in ask(server, own(server, REPORT_FILE))[1]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,11 +13,14 @@ from typing import Any
 
 import pytest
 
+from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.templates.kinds import template
+from exugear.results.folder import REPORT_FILE, keep_case, note_time
 
 from .page_view import IN_BROWSER, SIZES
 
-pytestmark = [*IN_BROWSER, pytest.mark.usefixtures("terminal_signals")]
+pytestmark = IN_BROWSER
+PAIR = template("pair")
 WAIT = 120_000
 """Longest wait, ms: compiled kernels may have to be compiled first."""
 
@@ -65,35 +69,47 @@ class EditView:
     def pixels(self, selector: str) -> str:
         return str(self.page.evaluate("s => document.querySelector(s).toDataURL()", selector))
 
-    def soon(self, claim: Callable[[], bool]) -> bool:
-        for _ in range(300):
+    def soon(self, claim: Callable[[], bool], seconds: int = 30) -> bool:
+        for _ in range(10 * seconds):
             if claim():
                 return True
             self.page.wait_for_timeout(100)
         return False
 
 
-@pytest.fixture
-def case(tmp_path: Path) -> Path:
-    path = tmp_path / "pair.toml"
-    path.write_text(template("pair"), encoding="utf-8")
-    return path
-
-
-@pytest.fixture
-def address(case: Path) -> Iterator[str]:
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, str]]:
+    """File and address of one server for all tests, since its start takes longer than most of them."""
     pytest.importorskip("playwright", reason="no playwright: pip install playwright")
-    command = [sys.executable, "-P", "-c", "from exugear.cli.app import main; main()"]
-    arguments = ["edit", str(case), "--no-browser", "--out", str(case.parent / "results")]
+    path = tmp_path_factory.mktemp("edit") / "pair.toml"
+    path.write_text(PAIR, encoding="utf-8")
+    # A shell that starts tests in its background ignores SIGINT for them and for their children.
+    listening = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+    command = [sys.executable, "-P", "-c", f"{listening}; from exugear.cli.app import main; main()"]
+    arguments = ["edit", str(path), "--no-browser", "--out", str(path.parent / "results")]
     with subprocess.Popen(
         [*command, *arguments], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
     ) as server:
         assert server.stdout is not None
         found = re.search(r"http://127\.0\.0\.1:\d+/[\w-]+/", server.stdout.readline())
         assert found
-        yield found[0]
+        yield path, found[0]
         server.send_signal(signal.SIGINT)
         assert server.wait(60) == 130
+
+
+@pytest.fixture
+def case(served: tuple[Path, str]) -> Path:
+    """The file as it was before the first test, without results."""
+    path = served[0]
+    path.write_text(PAIR, encoding="utf-8")
+    shutil.rmtree(path.parent / "results", ignore_errors=True)
+    return path
+
+
+@pytest.fixture
+def address(served: tuple[Path, str], case: Path) -> str:
+    return served[1]
 
 
 @pytest.fixture
@@ -109,7 +125,7 @@ def test_an_error_is_shown_at_its_line_and_its_correction_is_taken(view: EditVie
     view.page.keyboard.press("Delete")
     view.page.keyboard.press("Delete")
     view.page.wait_for_selector("#verdict.bad")
-    number = template("pair").split("\n").index("teeth = 24") + 1
+    number = PAIR.split("\n").index("teeth = 24") + 1
     assert "did you mean 'teeth'?" in view.text("#remarks")
     assert view.text("#remarks button.choice") == f"Line {number}"
     assert view.page.locator(".cm-lint-marker-error").count() == 1
@@ -186,27 +202,58 @@ def test_a_mode_is_chosen_in_the_table_and_in_the_diagram(view: EditView) -> Non
     assert view.errors == []
 
 
-def test_long_work_shows_progress_and_is_cancelled(view: EditView, case: Path) -> None:
-    view.page.get_by_role("button", name="Tables").click()
+@pytest.mark.parametrize("name", ["Tables", "Design changes"])
+def test_long_work_shows_progress_and_is_cancelled(view: EditView, case: Path, name: str) -> None:
+    view.page.get_by_role("button", name=name).click()
     view.page.wait_for_selector("#cancel:visible")
     assert view.soon(lambda: view.page.evaluate("document.getElementById('progress').value") > 0)
     assert re.search(r"(state|position) \d+ of \d+", view.text("#work-words"))
     view.page.click("#cancel")
-    assert view.soon(lambda: view.text("#work-words").startswith("Tables: cancelled after"))
+    assert view.soon(lambda: view.text("#work-words").startswith(f"{name}: cancelled after"))
     assert not view.page.locator("#cancel").is_visible()
     assert not list((case.parent / "results").glob("**/*.tmp"))
+    assert not view.page.locator("#stored").is_visible()
+    assert view.errors == []
+
+
+@pytest.mark.long
+def test_finished_design_changes_are_opened_in_a_page_of_their_own(view: EditView) -> None:
+    view.page.get_by_role("button", name="Design changes").click()
+    assert view.soon(lambda: "Design change 2 of" in view.text("#work-words"), seconds=300)
+    assert view.soon(lambda: view.text("#work-words").startswith("Design changes: done after"), seconds=900)
+    with view.page.context.expect_page() as opened:
+        view.page.get_by_role("link", name="Open report").click()
+    opened.value.get_by_role("heading", name="Design changes").wait_for(state="attached")
+    assert view.errors == []
+
+
+def test_stored_results_of_another_state_are_grey_and_said_in_words(view: EditView, case: Path) -> None:
+    assert not view.page.locator("#stored").is_visible()
+    folder = case.parent / "results"
+    keep_case(Gearbox.from_toml(case), folder)
+    for step in ("steady, bushing, discs, line_of_action", "report"):
+        note_time(folder, step, 1.0)
+    (folder / REPORT_FILE).write_text("<title>report</title>")
+    assert view.soon(lambda: "Report: for this text" in view.text("#stored"))
+    assert view.page.locator("#stored .old").count() == 0
+    view.type_over("modal_percent = 2.0", 3, "2.5")
+    assert view.soon(lambda: "Report: for the saved file, not for this text" in view.text("#stored"))
+    assert view.text("#report") == "Open report of an earlier state"
+    view.page.click("#save")
+    assert view.soon(lambda: "Steady-state response: for an earlier state of the file" in view.text("#stored"))
+    assert view.page.locator("#stored .old").count() == 3
     assert view.errors == []
 
 
 def test_the_file_is_written_on_request_only_and_keeps_its_comments(view: EditView, case: Path) -> None:
     view.type_over("modal_percent = 2.0", 3, "2.5")
     view.current()
-    assert case.read_text(encoding="utf-8") == template("pair")
+    assert case.read_text(encoding="utf-8") == PAIR
     view.page.get_by_role("button", name="Tables").click()
     assert "Save the file first" in view.text("#said")
     view.page.click("#save")
     assert view.soon(lambda: view.text("#saved") == "saved")
-    assert case.read_text(encoding="utf-8") == template("pair").replace("modal_percent = 2.0", "modal_percent = 2.5")
+    assert case.read_text(encoding="utf-8") == PAIR.replace("modal_percent = 2.0", "modal_percent = 2.5")
 
 
 def test_text_that_is_not_saved_survives_a_reload(view: EditView) -> None:
@@ -224,7 +271,7 @@ def test_two_tabs_and_another_editor_do_no_harm(view: EditView, browser: Any, ad
     other.page.wait_for_selector(".cm-line >> text=modal_percent = 2.5")
     # Both change it: the second to save is asked.
     other.type_over("modal_percent = 2.5", 3, "3.5")
-    case.write_text(template("pair").replace("modal_percent = 2.0", "modal_percent = 1.0"), encoding="utf-8")
+    case.write_text(PAIR.replace("modal_percent = 2.0", "modal_percent = 1.0"), encoding="utf-8")
     view.page.wait_for_selector(".cm-line >> text=modal_percent = 1.0")
     other.page.wait_for_selector("#conflict:visible")
     other.page.click("#keep-text")

@@ -16,7 +16,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.system.build import assemble
 from exugear.system.loads import LoadTable
 from exugear.system.modes import FREE_ROTATION, eigenmodes, modes_of
-from exugear.system.statics import linearise, locked_equilibrium
+from exugear.system.statics import linearise, locked_equilibrium, static_state
 from exugear.transient.exudyn_model.system import ExudynSystem
 
 from ..cases.assembled import modes_with_bodies
@@ -341,6 +341,7 @@ def test_modes_show_themselves_in_one_line_and_as_a_table(grc: Gearbox, stiffnes
     assert f"{len(modes.frequency)} modes up to {modes.frequency[-1]:.5g} Hz" in repr(modes)
     table = modes._repr_html_()
     assert table.count("<tr>") == 12
+    assert table.count("<img ") == static_state(modes.assembly)._repr_html_().count("<img ") == 1
     assert f"2: {modes.frequency[1]:.1f} Hz" in table and modes.names[1] in table
     linear = linearise(modes.assembly, np.zeros(modes.assembly.size))
     assert f"{modes.assembly.size} coordinates" in repr(linear)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,14 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.system.build import assemble
 from exugear.system.kernels.connectors import add_connector_forces
 from exugear.system.kernels.meshes import TILT_STIFFNESS
-from exugear.system.statics import BalanceError, accelerating_start, linearise, locked_equilibrium, tangent_stiffness
+from exugear.system.statics import (
+    BalanceError,
+    accelerating_start,
+    linearise,
+    locked_equilibrium,
+    static_state,
+    tangent_stiffness,
+)
 from exugear.system.system import Assembly
 
 from ..cases.assembled import assembled
@@ -176,3 +184,19 @@ def test_the_tangent_of_the_statics_is_the_sum_over_the_elements(
     expected = linearise(assembly, q).total_stiffness
     found = tangent_stiffness(assembly, q, assembly.mean_meshes)
     assert np.abs(found - expected).max() < 1e-12 * np.abs(expected).max()
+
+
+def test_the_static_state_found_on_the_way_to_an_assembly_is_that_of_a_new_search(
+    grc: Gearbox, stiffness: dict
+) -> None:
+    assembly = assembled(grc, Choice("bushing"), stiffness)
+    assert assembly.known_rest
+    known = static_state(assembly)
+    copy = replace(assembly)
+    assert not copy.known_rest
+    searched = static_state(copy)
+    largest = np.abs(searched.q).max()
+    assert np.abs(known.q - searched.q).max() < 1e-9 * largest
+    assert known.mesh_force == pytest.approx(searched.mesh_force, rel=1e-9)
+    known.q[:] = 0.0  # the result belongs to the caller
+    assert static_state(assembly).q.any()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from html.parser import HTMLParser
 
 import numpy as np
@@ -102,7 +103,7 @@ class Page(HTMLParser):
 
 def test_a_notebook_shows_small_tables_and_runs_no_name(shown):
     pieces = {name: value._repr_html_() for name, value in shown.items()}
-    tables = {name: piece for name, piece in pieces.items() if piece.startswith("<table>")}
+    tables = {name: re.split("<img |<p>", piece)[0] for name, piece in pieces.items() if piece.startswith("<table>")}
     assert {"Gear", "GearPair", "FlankModification", "MeshTable", "NonlinearTable", "SteSurface"} < set(tables)
     for name, table in tables.items():
         page = Page()

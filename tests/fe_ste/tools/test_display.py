@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import sys
+from base64 import b64decode
 from dataclasses import dataclass
 from html.parser import HTMLParser
 from pathlib import Path
@@ -10,8 +12,10 @@ from string import Formatter
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 
 from fe_ste.tools.display import ReprMixin, html_table, value_range
+from fe_ste.tools.drawing import paper_axes
 
 HOSTILE = ("<script>alert(1)</script>", "</td></table><b>", '" onload="x', "&lt;", "dollar $x$", "\x1b[31m", "Zähne")
 
@@ -116,3 +120,37 @@ def test_stated_lines_name_attributes_that_their_classes_have():
     for name, line, members in lines:
         fields = [field for _, field, _, _ in Formatter().parse(line) if field is not None]
         assert fields and {field.partition(".")[0].partition("[")[0] for field in fields} <= members, name
+
+
+class Drawn(ReprMixin, line=" {name}"):
+    name = "<b>"
+
+    def plot(self) -> Axes:
+        ax = paper_axes()
+        ax.set_title("$not math \x1b")
+        return ax
+
+
+class Undrawable(Drawn):
+    def plot(self) -> Axes:
+        raise KeyError("<i>no run</i>")
+
+
+def test_a_notebook_shows_the_diagram_of_a_result_inside_of_its_page(monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)  # whose backend somebody may have set
+    text, picture = Drawn()._repr_html_().split("<img ")
+    assert text == "<p>&lt;Drawn &lt;b&gt;&gt;</p>"
+    content = b64decode(picture.split("base64,")[1].removesuffix('">'))
+    assert content.startswith(b"\x89PNG")
+    assert len(content) < 50_000
+
+
+def test_a_result_that_cannot_be_drawn_keeps_its_text_and_says_why():
+    assert Undrawable()._repr_html_() == (
+        "<p>&lt;Undrawable &lt;b&gt;&gt;</p><p>No diagram: &#x27;&lt;i&gt;no run&lt;/i&gt;&#x27;</p>"
+    )
+
+
+def test_a_line_of_text_draws_nothing(monkeypatch):
+    monkeypatch.setattr(Drawn, "plot", Undrawable.plot)
+    assert repr(Drawn()) == "<Drawn <b>>"

@@ -20,7 +20,7 @@ let timer = 0;
 /** Number of the text: results of an earlier one are shown grey. */
 let version = 0;
 /** Results that come one after the other. */
-const STEPS = ["check", "dynamics", "picture", "loads"];
+const STEPS = ["check", "picture", "dynamics", "loads"];
 
 const editor = makeEditor(need("text"), { changed: onText, moved: onCursor, save: () => void save() });
 const text = () => editor.state.doc.toString();
@@ -58,12 +58,12 @@ async function compute() {
     try {
       for await (const step of results(text(), shownGeometry())) {
         if (step.step === "check") showCheck(step, goTo);
-        if (step.step === "dynamics") showDynamics(step);
         if (step.step === "picture") await showPicture(step);
+        if (step.step === "dynamics") await showDynamics(step);
         if (step.step === "loads") showLoads(step, goTo);
         if (mine === version) tell(step);
         else setOld(STEPS, true);
-        if (again && step.step !== "check") break;
+        if (again && step.step === "dynamics") break;
       }
     } catch (error) {
       tellVerdict(error instanceof Error && error.message ? error.message : "The server does not answer.", "bad");
@@ -173,6 +173,7 @@ function beginPicking() {
 
 async function begin() {
   beginModeView();
+  need("mode-title").dataset.step = "dynamics";
   beginPicking();
   beginSlider(editor);
   beginTheme(() => (showCampbell(), void drawMode()));

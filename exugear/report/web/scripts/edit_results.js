@@ -1,7 +1,7 @@
 // What the program makes of the text: verdict, messages, tables, Campbell diagram and picture, each as soon as it is known.
 import { drawCampbell } from "./edit_campbell.js";
 import { make, need } from "./dom.js";
-import { drawMode, shownStage } from "./mode_view.js";
+import { drawAtRest, drawMode, shownStage } from "./mode_view.js";
 import { addArrays, pageData } from "./page_data.js";
 import { choose, state } from "./state.js";
 
@@ -15,6 +15,9 @@ const PICKED = ["gears", "bearings", "bodies"];
 
 /** @type {{parts: PartData[], remarks: Remark[], campbell: import("./edit_campbell.js").Campbell | null}} */
 export const shown = { parts: [], remarks: [], campbell: null };
+
+/** Bodies of the picture. @type {import("./page_data.js").StageData | undefined} */
+let bodies;
 
 /** Time (ms) after which results of an earlier state become grey: most are new before, and nothing flickers. */
 const LATE = 300;
@@ -65,9 +68,18 @@ export function showLoads(step, goTo) {
 }
 
 /** @param {any} step */
-export function showDynamics(step) {
+export async function showPicture(step) {
+  addArrays(step.arrays);
+  // The same bodies go on moving as before until their new modes are known.
+  if (bodies?.geometry !== step.geometry) await drawAtRest((bodies = { ...step.stage, geometry: step.geometry }));
+  setOld(["picture"], false);
+}
+
+/** @param {any} step */
+export async function showDynamics(step) {
   shown.remarks = [...shown.remarks, ...step.remarks];
   if (step.failed) return;
+  addArrays(step.arrays);
   fillTable("modes", step.tables.modes, (key) => chooseMode(Number(key)));
   need("model").textContent = `Model: ${step.model}.`;
   const table = step.tables.modes.rows;
@@ -79,32 +91,24 @@ export function showDynamics(step) {
     modes[Number(key)] = { frequency: Number(cells[1]), damping: 0, words: cells[3], title };
   }
   const before = pageData.models[MODEL];
-  pageData.models[MODEL] = { words: "", variant: "", stage: before?.stage, modes };
+  pageData.models[MODEL] = { words: "", variant: "", stage: { ...bodies, ...step.stage }, modes };
   shown.campbell = step.campbell;
   const mode = before && state.mode >= 0 && state.mode < count ? state.mode : step.first;
   if (!before) choose({ model: MODEL, mode });
-  else if (mode !== state.mode) chooseMode(mode);
-  setOld(["dynamics"], false);
+  else choose({ model: MODEL, mode });
   showCampbell();
-}
-
-/** @param {any} step */
-export async function showPicture(step) {
-  addArrays(step.arrays);
-  const model = pageData.models[MODEL];
-  model.stage = { ...step.stage, geometry: step.geometry };
   await drawMode();
-  setOld(["picture"], false);
+  setOld(["dynamics"], false);
 }
 
-/** Name of the bodies that the stage has. */
-export const shownGeometry = () => shownStage()?.data?.geometry ?? "";
+/** Name of the bodies that the page has. */
+export const shownGeometry = () => bodies?.geometry ?? "";
 
 /** @param {number} mode from 0 */
 export function chooseMode(mode) {
   choose({ model: MODEL, mode });
   showCampbell();
-  if (pageData.models[MODEL]?.stage) void drawMode();
+  void drawMode();
 }
 
 export function showCampbell() {

@@ -3,7 +3,7 @@ import { make, need, say } from "./dom.js";
 import { ask } from "./edit_server.js";
 
 /** @typedef {{kind: string, name: string, state: string, digest: string, seconds: number, progress: {words?: string, done?: number, total?: number | null, left?: number | null}, lines: string[]}} Told */
-/** @typedef {{digest: string, missing: boolean, report: string}} FileState */
+/** @typedef {{digest: string, missing: boolean, results: Record<string, string>}} FileState */
 
 const PERIOD = 1000;
 const REPORT_STATES = /** @type {Record<string, string>} */ ({ current: "Open report", old: "Open report of an earlier state" });
@@ -24,7 +24,7 @@ export function beginWork(isSaved, noticeFile) {
       const { file, work } = await response.json();
       noticeFile(file);
       showWork(work, isSaved() ? file.digest : "");
-      showReport(isSaved() ? file.report : file.report === "current" ? "old" : file.report);
+      showStored(file.results, isSaved());
       need("ended").hidden = true;
     } catch {
       need("ended").hidden = false;
@@ -51,7 +51,7 @@ function showWork(work, digest) {
   const earlier = !running && work.digest !== digest;
   need("work").classList.toggle("old", earlier);
   const { words = "", done = 0, total = null, left = null } = work.progress;
-  const told = running ? [words, timeText(work.seconds), left === null ? "" : `${timeText(left)} left`] : [`${work.state} after ${timeText(work.seconds)}`];
+  const told = running ? [work.lines.at(-1), words, timeText(work.seconds), left === null ? "" : `${timeText(left)} left`] : [`${work.state} after ${timeText(work.seconds)}`];
   need("work-words").textContent = `${work.name}: ${told.filter(Boolean).join(", ")}${earlier ? "; for an earlier state of the file" : ""}`;
   const bar = /** @type {HTMLProgressElement} */ (need("progress"));
   bar.hidden = !running;
@@ -62,13 +62,22 @@ function showWork(work, digest) {
   need("work-output").hidden = !work.lines.length;
 }
 
-/** @param {string} state */
-function showReport(state) {
-  const place = need("report");
-  if (place.dataset.state === state) return;
-  place.dataset.state = state;
-  place.replaceChildren();
-  if (REPORT_STATES[state]) place.append(make("a", { href: "report.html", target: "_blank", class: state }, REPORT_STATES[state]));
+/** Say which results are in the folder, and for which state. @param {Record<string, string>} results @param {boolean} saved */
+function showStored(results, saved) {
+  const place = need("stored");
+  const told = JSON.stringify([results, saved]);
+  if (place.dataset.told === told) return;
+  place.dataset.told = told;
+  const items = Object.entries(results).map(([kind, state]) => {
+    const current = saved && state === "current";
+    const words = current ? "for this text" : state === "current" ? "for the saved file, not for this text" : "for an earlier state of the file";
+    const name = document.querySelector(`[data-work=${kind}]`)?.textContent ?? kind;
+    return make("li", { class: current ? "current" : "old" }, `${name}: ${words}`);
+  });
+  place.hidden = !items.length;
+  need("stored-results").replaceChildren(...items);
+  const state = results.report && (saved ? results.report : "old");
+  need("report").replaceChildren(...(state ? [make("a", { href: "report.html", target: "_blank", class: state }, REPORT_STATES[state])] : []));
 }
 
 /** @param {number} seconds */

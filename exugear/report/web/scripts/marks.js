@@ -40,7 +40,13 @@ function drawFlags(drawing, stage, width, height) {
     drawing.beginPath();
     drawing.arc(x, y, 9, 0, 2 * Math.PI);
     drawing.stroke();
-    if (number === 0) drawing.fillText(text, x, y - 18);
+    if (number) return;
+    // The name of a body may be there.
+    const wide = drawing.measureText(text).width + 6;
+    drawing.fillStyle = pageColour("--panel");
+    drawing.fillRect(x - wide / 2, y - 18 - HEIGHT / 2, wide, HEIGHT);
+    drawing.fillStyle = pageColour("--bad");
+    drawing.fillText(text, x, y - 18);
   });
 }
 

@@ -99,6 +99,13 @@ export async function drawMode() {
   });
 }
 
+/** Show bodies whose modes are not known yet. @param {import("./page_data.js").StageData} data */
+export async function drawAtRest(data) {
+  if (!stage) return;
+  await stage.show(data, -1);
+  drawBodies(stage);
+}
+
 /** @param {Stage} current */
 function lookAgain(current) {
   current.lookFrom([0.75, 0.45, -1]);

@@ -8,7 +8,7 @@
 /** @typedef {{name: string, title: string, words: string, inertias: string, source: string, main: string, range: [number, number] | null, variants: Record<string, VariantData>}} GroupData */
 /** @typedef {{name: string, short: string, sentence: string, order: number, harmonic: number, family: string}} LineData */
 /** @typedef {{name: string, label: string, owner: string, fixed: boolean, elastic: boolean, colour: string, reference: number[], turn: number, low: number[], span: number[], points: ArrayReference, triangles: ArrayReference}} BodyData */
-/** @typedef {{bodies: BodyData[], centre: number[], diagonal: number, amplitude: number, motions: ArrayReference, deformed: Record<string, Record<string, ArrayReference>>, colours: string[], geometry?: string}} StageData */
+/** @typedef {{bodies: BodyData[], centre: number[], diagonal: number, amplitude: number, motions?: ArrayReference, deformed?: Record<string, Record<string, ArrayReference>>, colours: string[], geometry?: string}} StageData */
 /** @typedef {{title?: string, frequency: number, damping: number, words: string}} ModeData */
 /** @typedef {{words: string, variant: string, stage: StageData, modes: ModeData[]}} ModelData */
 /** @typedef {{label: string, style: string, right: boolean, x: ArrayReference, y: ArrayReference}} CurveData */

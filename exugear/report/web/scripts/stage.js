@@ -8,6 +8,7 @@ const HALF_SPEED = 2.2;
 /** A frame that takes longer than this (ms) makes the next ones rarer: machines without GPU. */
 const SLOW = 60;
 const FIRST_FRAMES = 4;
+const ORIGIN = [0, 0, 0];
 
 /** @typedef {import("./actors.js").Actor} Actor */
 /** Name at a point, m. @typedef {{text: string, at: number[]}} Flag */
@@ -63,16 +64,16 @@ export class Stage {
   }
 
   /**
-   * Show a mode of a model; other bodies are built anew.
+   * Show a mode of a model, or its bodies at rest without motions; other bodies are built anew.
    * @param {import("./page_data.js").StageData} data
    * @param {number} mode
    */
   async show(data, mode) {
     const mine = ++this.asked;
-    const motions = /** @type {Float32Array} */ (await unpack(data.motions));
+    const motions = data.motions ? /** @type {Float32Array} */ (await unpack(data.motions)) : null;
     /** @type {Record<number, Int8Array>} */
     const fields = {};
-    for (const [place, reference] of Object.entries(data.deformed[String(mode)] ?? {})) {
+    for (const [place, reference] of Object.entries(data.deformed?.[String(mode)] ?? {})) {
       fields[Number(place)] = /** @type {Int8Array} */ (await unpack(reference));
     }
     const same = data === this.data || (data.geometry !== undefined && data.geometry === this.data?.geometry);
@@ -161,14 +162,14 @@ export class Stage {
   /** Colour all points by their displacement, or bodies by their own colour. */
   colour() {
     if (!this.data) return;
-    const table = ramp(this.data.colours);
+    const table = Float32Array.from(ramp(this.data.colours), linear);
     this.actors.forEach((actor, place) => {
       const own = channelsOf(actor.data.colour).map(linear);
       for (let point = 0; point < actor.rest.length / 3; point++) {
         const size = Math.min(1, this.sizeAt(actor, place, point));
         const colour = 3 * Math.round(255 * size);
         for (let k = 0; k < 3; k++) {
-          actor.colours[3 * point + k] = this.byBody || actor.data.fixed ? own[k] : linear(table[colour + k]);
+          actor.colours[3 * point + k] = this.byBody || actor.data.fixed ? own[k] : table[colour + k];
         }
       }
       actor.mesh.geometry.attributes.color.needsUpdate = true;
@@ -189,7 +190,8 @@ export class Stage {
     const count = actor.rest.length / 3;
     if (field) return [0, 1, 2].map((k) => field[point + (3 * part + k) * count] / 127);
     const m = this.motionOf(place, part);
-    const [x, y, z] = [0, 1, 2].map((k) => actor.rest[3 * point + k] - (actor.data.elastic ? actor.data.reference[k] : 0));
+    const [u, v, w] = actor.data.elastic ? actor.data.reference : ORIGIN;
+    const [x, y, z] = [actor.rest[3 * point] - u, actor.rest[3 * point + 1] - v, actor.rest[3 * point + 2] - w];
     return [m[0] + m[4] * z - m[5] * y, m[1] + m[5] * x - m[3] * z, m[2] + m[3] * y - m[4] * x];
   }
 

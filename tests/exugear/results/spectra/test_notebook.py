@@ -38,7 +38,7 @@ def test_the_short_text_names_what_matters_in_one_line(spectra):
 def test_the_table_of_a_notebook_is_one_table_in_which_no_name_acts(spectra):
     for noun in spectra.values():
         table = noun._repr_html_()
-        assert set(re.findall(r"</?(\w+)", table)) == {"table", "caption", "tr", "th", "td"}
+        assert set(re.findall(r"</?(\w+)", table)) - {"img"} == {"table", "caption", "tr", "th", "td"}
         assert table.count("<table>") == table.count("</table>") == 1
 
 

@@ -120,7 +120,9 @@ def test_a_run_draws_the_levels_along_its_orders_and_its_waterfall(tmp_path, grc
     finished = Run(path, complete=True, end=8.0, wall=1.0)
     with pytest.raises(GearboxFileError, match="contains no results"):
         finished.plot()
+    assert "<p>No diagram: " in finished._repr_html_()
     keep_case(grc, tmp_path)
+    assert finished._repr_html_().count("<img ") == 1
     spectra = run_waterfall(path)
     panel = Figure().add_subplot()
     assert finished.plot(ax=panel) is panel
