@@ -93,9 +93,9 @@ def is_excited(data: xr.Dataset) -> bool:
 def _in_time(data: xr.Dataset, options: str = "") -> str:
     """Return what evaluates nonlinear models: the method `nonlinear`, or a run.
 
-    The method has neither orders of shafts nor a flexible ring gear.
+    The method has neither deviations of gears nor a flexible ring gear.
     """
-    if data.attrs.get("ring_carrier") or any(str(name).startswith("rotation of ") for name in data["base"].to_numpy()):
+    if data.attrs.get("ring_carrier") or data.attrs.get("deviating_gears"):
         return f"exugear run{options}"
     return f"{options} --method nonlinear".strip()
 

@@ -182,12 +182,12 @@ def check_deviations(gearbox: Gearbox, method: Method) -> None:
     Raises
     ------
     SteadyError
-        The gearbox file has deviations or excitations, and the method is ``nonlinear``.
+        The gearbox file has deviations, and the method is ``nonlinear``.
     """
-    if (gearbox.deviations or gearbox.varying_loads) and method == "nonlinear":
+    if gearbox.deviations and method == "nonlinear":
         raise SteadyError(
-            "deviations, excitations: the method nonlinear does not include the orders of the shafts; use --method "
-            "parametric with --mesh-model line_of_action, or exugear run"
+            "deviations: the method nonlinear does not include deviations of gears; use --method parametric with "
+            "--mesh-model line_of_action, or exugear run"
         )
 
 

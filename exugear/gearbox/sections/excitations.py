@@ -23,8 +23,8 @@ class ExcitationSection(Section):
     """Load on a rotating body that varies with its angle: an electric machine, an engine, a propeller, an unbalance.
 
     A torque, force or moment is the sum of A cos(order x angle + phase) over the orders, in addition to constant loads.
-    It acts in runs, and in steady-state responses with the methods `linear` and `parametric`. In the variant `rigid`
-    ideal joints react forces and moments. On a flexible shaft a seat is added at `z_mm`.
+    It acts in runs and in steady-state responses. In the variant `rigid` ideal joints react forces and moments. On a
+    flexible shaft a seat is added at `z_mm`.
     """
 
     body: Name

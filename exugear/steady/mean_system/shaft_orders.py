@@ -25,7 +25,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from exugear.steady.harmonics.lines import SAME, LineSet, Rotation, Sidebands, fourier_coefficients, largest
+from exugear.steady.harmonics.lines import (
+    SAME,
+    LineSet,
+    Rotation,
+    Sidebands,
+    TorusSampling,
+    fourier_coefficients,
+    largest,
+)
 from exugear.steady.mean_system.mesh_waves import MeshWaves
 from exugear.steady.mean_system.planet_sets import PlanetSet
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
@@ -72,11 +80,21 @@ class ShaftOrders:
     """(l,) speed of the body of each stated load over that of the input."""
     angles: Floats = field(default_factory=lambda: np.zeros((0, 0)))
     """(l, size) angle of that body by the static deflections, at zero angle of the input."""
+    on_planet: Booleans = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    """(l,) whether that body is a planet."""
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the rotations."""
         return tuple(rotation.name for rotation in self.rotations)
+
+    @property
+    def products(self) -> tuple[Sidebands, ...]:
+        """Sums and differences of the orders of two stated loads, which nonlinear forces add to these."""
+        orders = {own.multiples for own in self.sidebands if own.reach is not None}
+        both = itertools.product(orders, orders, (1, -1))
+        sums = {tuple(a + sign * b for a, b in zip(one, other, strict=True)) for one, other, sign in both}
+        return tuple(Sidebands(multiples, 0, 0) for multiples in sorted(sums) if any(multiples))
 
     def reaction_at(self, speed: float, static: Floats) -> Complexes:
         """Generalized forces (t, size) at a speed of the input (rad/s) and static deflections (size,)."""
@@ -86,6 +104,27 @@ class ShaftOrders:
             size, phase = size_and_phase(n, speed * self.speeds[n], self.loads)
             factors[self.load == n] = cmath.rect(size, phase + angles[n])
         return np.asarray(self.reaction * factors[:, None])
+
+    def change_by_turning(self, sampling: TorusSampling, motion: Complexes, speed: float, static: Floats) -> Floats:
+        """Sample how generalized forces (samples, size) of stated loads change with the turning of their bodies.
+
+        An angle d that a vibration adds to that of a body multiplies a load of order n by exp(i n d). Loads on single
+        planets are left as they are.
+
+        Parameters
+        ----------
+        motion : (lines, size) about the static state, in the rotating frame
+        speed : of the input, rad/s
+        static : (size,) deflections
+        """
+        sense = math.copysign(1.0, speed)
+        own = np.flatnonzero((self.load >= 0) & ~self.on_planet[self.load])
+        loads = self.load[own]
+        added = self.loads.order[loads] * sampling.values(motion @ self.angles.T)[:, loads]
+        first = sampling.angles.shape[1] - self.multiples.shape[1]
+        angles = sampling.angles[:, first:] @ self.multiples[own].T
+        turned = np.exp(1j * (sense * angles + added)) - np.exp(1j * sense * angles)
+        return np.asarray(2.0 * (turned @ self.reaction_at(speed, static)[own]).real)
 
     def places(self, lines: LineSet, meshes: int) -> Places:
         """Places of the terms in lines of which `meshes` bases are meshes."""
@@ -259,6 +298,7 @@ class _Series:
             np.array([n for n, _ in self.displacement], dtype=np.int64),
             np.array([self.frame.speeds.get(load.body, 0.0) for load in loads]),
             self.frame.matrices(0.0)[0][self.assembly.varying_loads.turning],
+            np.array([any(load.body in planets.names for planets in self.frame.sets) for load in loads], dtype=bool),
         )
 
     def _wheel(self, mesh: int, end: int) -> tuple[str, int]:
