@@ -63,6 +63,7 @@ class ExcitationSection(Section):
     """Speed of the body at which the amplitudes are as stated; required with `speed_exponent`."""
     reaction_on: Name | None = None
     """Body on which the opposite acts, such as the housing with the stator; a rigid fixed body takes it to the ground.
+    A flexible housing takes it at the seat that has the name of the excitation, otherwise at its seat of torques.
     """
     enabled: bool = True
     """Whether it acts."""
