@@ -164,7 +164,7 @@ class PointSolver:
         """Fastest growth of a disturbance between two speeds of the input (rad/s), 1/s."""
         model = self.linear.without_shaft_orders.frozen
         found = [mean_growth(model)]
-        unknown = model.loses_contact or model.waves.carriers
+        unknown = model.loses_contact or model.waves.carriers or not model.waves.waves
         for candidate in () if unknown else candidates(model, low, high)[:CHECKED]:
             balance = HarmonicResidual(model, model.at(candidate.speed), model.sampling)
             found.append(growth_at(balance, balance.static, candidate.base))

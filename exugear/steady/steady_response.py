@@ -381,11 +381,12 @@ def response_of(
 
 
 def _tracks(model: HarmonicBalanceModel, speeds: Floats) -> ModeTracks:
-    """Follow modes that a mesh or one of its harmonics may reach; of elastic bodies, those that their band holds."""
+    """Follow modes that a harmonic of a mesh or a stated load may reach; of elastic bodies, those in their band."""
     assembly = model.waves.assembly
     low = float(speeds.min())
     high = float(speeds.max())
-    highest = HARMONICS * float(model.waves.base_orders.max()) * float(np.abs(speeds).max()) / (2.0 * np.pi)
+    order = max(HARMONICS * float(model.waves.base_orders.max(initial=0.0)), model.shaft_orders.highest_load)
+    highest = order * float(np.abs(speeds).max()) / (2.0 * np.pi)
     if assembly.elastic_bodies:
         highest = min(highest, assembly.gearbox.case.elasticity.band_Hz)
     return modes_over_speed(model.system.frozen, low, high, highest)

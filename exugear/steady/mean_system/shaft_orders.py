@@ -89,12 +89,17 @@ class ShaftOrders:
         return tuple(rotation.name for rotation in self.rotations)
 
     @property
+    def highest_load(self) -> float:
+        """Highest order of a stated load over the rotation of the input; 0 without any."""
+        return float(np.max(np.abs(self.speeds) * self.loads.order, initial=0.0))
+
+    @property
     def products(self) -> tuple[Sidebands, ...]:
         """Sums and differences of the orders of two stated loads, which nonlinear forces add to these."""
-        orders = {own.multiples for own in self.sidebands if own.reach is not None}
+        orders = {own.multiples for own in self.sidebands if own.base is None}
         both = itertools.product(orders, orders, (1, -1))
         sums = {tuple(a + sign * b for a, b in zip(one, other, strict=True)) for one, other, sign in both}
-        return tuple(Sidebands(multiples, 0, 0) for multiples in sorted(sums) if any(multiples))
+        return tuple(Sidebands(multiples) for multiples in sorted(sums) if any(multiples))
 
     def reaction_at(self, speed: float, static: Floats) -> Complexes:
         """Generalized forces (t, size) at a speed of the input (rad/s) and static deflections (size,)."""
@@ -199,8 +204,8 @@ class _Series:
         """Order of each rotation, by its name; those of carriers whose planets mesh out of phase come first."""
         self.displacement: dict[tuple[int, Key], Complexes] = {}
         self.reaction: dict[tuple[int, Key], Complexes] = {}
-        self.beside: list[tuple[Key, int, int | None]] = []
-        """Rotations, the base of the mesh beside whose harmonics they appear, and the highest of these."""
+        self.beside: list[tuple[Key, int | None, int | None]] = []
+        """Rotations, the base of the mesh beside whose harmonics they appear if any, and the highest of these."""
 
     def add_family(self, meshes: tuple[int, ...], planets: PlanetSet | None) -> None:
         """Add the deviations of all meshes of a family of planets, or of a single mesh."""
@@ -248,7 +253,7 @@ class _Series:
         for key, turned in self._in_frame(load.body, load.order, wave):
             self._add(self.displacement, (number, key), np.zeros(len(self.waves.waves), dtype=complex))
             self._add(self.reaction, (number, key), turned)
-            self.beside += [(key, base, REACH) for base in range(len(self.waves.base_orders))]
+            self.beside += [(key, None, None), *((key, base, REACH) for base in range(len(self.waves.base_orders)))]
 
     def _in_frame(self, body: str, order: float, wave: Complexes) -> list[tuple[Key, Complexes]]:
         """Multiples of rotations, and generalized forces (size,) in the rotating frame, of a load on a body."""
