@@ -335,3 +335,21 @@ def test_the_terminal_names_the_excitation_of_an_order(tmp_path, monkeypatch):
     assert "12 × rotation of shaft_1 (ripple)" in said
     assert "Sources of the transmission error at resonances" in said
     assert "ripple 100 %" in said
+
+
+@pytest.mark.validation
+def test_report_and_view_name_the_excitation_of_a_resonance(tmp_path, monkeypatch):
+    """The page states cause and share, and draws combinations of mesh and excitation; the view has its order."""
+    monkeypatch.chdir(tmp_path)
+    answer(tmp_path)
+    result = CliRunner().invoke(app, ["report", "results", "--stored"])
+    assert result.exit_code == 0, result.output
+    page = (tmp_path / "results" / "report.html").read_text(encoding="utf-8")
+    assert "Excited by the 12th order of the rotation of shaft 1 (excitation ripple)" in page
+    assert "ripple 100 %" in page
+    monkeypatch.setattr("exugear.cli.tasks.view._draw_pictures", lambda *given: [])
+    result = CliRunner().invoke(app, ["view", "gearbox.toml", "--out", "results"])
+    assert result.exit_code == 0, result.output
+    pages = [path.read_text(encoding="utf-8") for path in (tmp_path / "results").rglob("modes.html")]
+    assert pages
+    assert any("(ripple)" in text for text in pages)
