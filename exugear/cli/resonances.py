@@ -46,12 +46,16 @@ def _order(gearbox: Gearbox) -> Column:
 
 
 def source_table(gearbox: Gearbox, data: xr.Dataset) -> Table | None:
-    """Return the shares of meshes and excitations in the orders at resonances; None for a file without excitations."""
-    if not gearbox.varying_loads:
+    """Return the shares of meshes and excitations in the orders at resonances.
+
+    None for a file without excitations, and for mesh models with contact loss, whose response is no sum of shares.
+    """
+    peaks = json.loads(data.attrs["contributions"])
+    if not gearbox.varying_loads or not peaks:
         return None
     bases = tuple(str(name) for name in data["base"].to_numpy())
     rows = []
-    for peak in json.loads(data.attrs["contributions"]):
+    for peak in peaks:
         name = line_name(tuple(data["index"].to_numpy()[peak["line"]].tolist()), bases)
         shares = sorted(peak["meshes"].items(), key=lambda own: -abs(own[1]))
         listed = [f"{source} {100.0 * share:.0f} %" for source, share in shares if abs(share) >= LEAST_SOURCE]

@@ -201,7 +201,7 @@ def summarise_loads(
     net = float(torques[0] @ unit)
     return LoadSummary(
         name=case.name,
-        inertia=float(axial @ unit**2),
+        inertia=inertia_at_input(gearbox, inertias),
         # Round-off of the torques counts as zero.
         net_torque=net if abs(net) > UNLOADED * float(np.abs(torques[0] * unit).max(initial=0.0)) else 0.0,
         driven=case.driven_body is not None,
@@ -475,6 +475,13 @@ def _axial_inertias(gearbox: Gearbox, inertias: str | None) -> Floats:
         if body.carrier is not None and body.carrier in axial:
             axial[body.carrier] += body.mass * math.dist(body.axis, bodies[body.carrier].axis) ** 2
     return np.array([axial[name] for name in gearbox.spinning])
+
+
+def inertia_at_input(gearbox: Gearbox, inertias: str | None = None) -> float:
+    """Moment of inertia of the kinematic gear train at the overall input, by its kinetic energy, kg m2."""
+    unit = gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
+    speeds = np.array([unit[name] for name in gearbox.spinning])
+    return float(_axial_inertias(gearbox, inertias) @ speeds**2)
 
 
 def _instants(series: Series, total: float) -> Floats:

@@ -33,7 +33,7 @@ from exugear.report.findings.design_changes import (
 from exugear.report.findings.margins import Margin, failing, margins_in_words, margins_of, shortfalls_of
 from exugear.report.findings.proposals import ASSUMPTION, DesignChange, propose_changes
 from exugear.report.findings.ranking import Resonance, ranking_of
-from exugear.report.findings.words import QUANTITIES
+from exugear.report.findings.words import QUANTITIES, excitations_at
 from exugear.results.folder import DESIGN_CHANGES_FILE, bodies_folder
 from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.settings import SteadySettings
@@ -54,7 +54,7 @@ if TYPE_CHECKING:
 FOLDER = "design-changes"
 """Subfolder of the results with one folder for each changed gearbox."""
 LEAST_ENERGY = 0.1
-"""Fraction of the strain energy from which changes of a bearing are proposed."""
+"""Fraction of the strain energy from which changes of a bearing or a coupling are proposed."""
 STATIC = "static load"
 """Load by default."""
 MOST_LOAD = 3.0
@@ -199,14 +199,18 @@ def _proposed(project: ComputedProject, exciting: dict[str, int], resonance: Res
     modes = project.modes()
     mode = modes.nearest(resonance.frequency)
     families = {bearing.name: bearing.family for bearing in project.gearbox.bearings}
+    families |= {coupling.name: coupling.name for coupling in project.gearbox.couplings}
     strain = dict(zip(modes.element_names, modes.strain[mode].tolist(), strict=True))
     energies: dict[str, float] = {}
     for name, energy in strain.items():
         if name in families:
             energies[families[name]] = energies.get(families[name], 0.0) + energy
     least = LEAST_ENERGY * sum(strain.values())
-    bearings = sorted((name for name in energies if energies[name] >= least), key=lambda name: -energies[name])
-    return propose_changes(project.gearbox, exciting, deflections, bearings)
+    strained = sorted((name for name in energies if energies[name] >= least), key=lambda name: -energies[name])
+    couplings = [name for name in strained if name in project.gearbox.case.couplings]
+    bearings = [name for name in strained if name not in couplings]
+    acting = excitations_at(project.gearbox, resonance.order)
+    return propose_changes(project.gearbox, exciting, deflections, bearings, couplings, acting)
 
 
 def _changed_gearbox(project: ComputedProject, change: DesignChange) -> Gearbox:

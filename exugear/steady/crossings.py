@@ -323,7 +323,7 @@ def contributions(model: HarmonicBalanceModel, speed: float, line: int) -> Contr
     motion = np.linalg.solve(dynamic, loads).astype(np.complex128)
     total = complex(row @ motion)
     meshes: dict[str, float] = {}
-    parts = (adjoint @ forces).reshape(len(model.waves.waves), -1).sum(axis=1)
+    parts = (adjoint @ forces).reshape(len(model.waves.waves), model.ports_at(speed).forces.shape[1]).sum(axis=1)
     for wave, part in zip(model.waves.waves, parts, strict=True):
         meshes[wave.family] = meshes.get(wave.family, 0.0) + _share(complex(part), total)
     for source in dict.fromkeys(filter(None, model.shaft_orders.source)):

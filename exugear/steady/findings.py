@@ -93,9 +93,9 @@ def is_excited(data: xr.Dataset) -> bool:
 def _in_time(data: xr.Dataset, options: str = "") -> str:
     """Return what evaluates nonlinear models: the method `nonlinear`, or a run.
 
-    The method has neither orders of shafts nor a flexible ring gear.
+    The method has neither deviations of gears nor a flexible ring gear.
     """
-    if data.attrs.get("ring_carrier") or any(str(name).startswith("rotation of ") for name in data["base"].to_numpy()):
+    if data.attrs.get("ring_carrier") or data.attrs.get("deviating_gears"):
         return f"exugear run{options}"
     return f"{options} --method nonlinear".strip()
 
@@ -144,7 +144,7 @@ def _models(data: xr.Dataset) -> Iterator[Finding]:
         text += f"{100.0 * pull.share:.2g} % of the time at {_rpm(pull.speed)}; amplitudes there are invalid, because "
         text += f"the model {model} neglects contact loss; use {_in_time(data, ' --mesh-model table')}"
         yield Finding("warning", text, pull.share)
-    apart = float(np.nanmax(data["contact_loss_fraction"], initial=0.0))
+    apart = float(np.max(np.nan_to_num(data["contact_loss_fraction"].to_numpy()), initial=0.0))
     if apart > 0.0:
         text = f"contact loss for up to {100.0 * apart:.2g} % of the time (included in the mesh model)"
         yield Finding("passed", text, apart)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from exugear.steady.balance.excitation import HarmonicBalanceModel, Interface
+from exugear.steady.balance.excitation import HarmonicBalanceModel, Interface, LoadResponse
 from exugear.steady.balance.nonlinear import (
     CHECKED,
     HarmonicResidual,
@@ -25,6 +25,7 @@ from exugear.steady.balance.nonlinear import (
     nonlinear_response,
     response_of_readings,
     solve_balance,
+    solve_turning,
 )
 from exugear.steady.balance.response import (
     Response,
@@ -37,7 +38,7 @@ from exugear.steady.balance.response import (
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
 from exugear.steady.harmonics.lines import LineSet, TorusSampling, joined, largest
 from exugear.steady.mean_system.mean_system import mean_system
-from exugear.steady.mean_system.mesh_places import DEFLECTION
+from exugear.steady.mean_system.mesh_places import DEFLECTION, POSITION
 from exugear.steady.mean_system.mesh_waves import FEWEST, mesh_waves
 from exugear.steady.mean_system.shaft_orders import shaft_orders, without_deviations
 from exugear.steady.settings import Method
@@ -113,9 +114,14 @@ class ContactLossState:
             return self
         old = self.response
         at = model.places_in(self.model)
+        interface = interface or model.at(old.interface.speed)
+        loads = old.interface.loads
+        if loads is not None and model.shaft_orders.sidebands:
+            turned = LoadResponse(loads.loads[at[0].ravel()], loads.motion[at[0].ravel()], loads.torque)
+            interface = replace(interface, loads=turned)
         response = replace(
             old,
-            interface=interface or model.at(old.interface.speed),
+            interface=interface,
             deflection=old.deflection[at],
             excess=old.excess[at],
             force=old.force[at],
@@ -158,7 +164,7 @@ class PointSolver:
         """Fastest growth of a disturbance between two speeds of the input (rad/s), 1/s."""
         model = self.linear.without_shaft_orders.frozen
         found = [mean_growth(model)]
-        unknown = model.loses_contact or model.waves.carriers
+        unknown = model.loses_contact or model.waves.carriers or not model.waves.waves
         for candidate in () if unknown else candidates(model, low, high)[:CHECKED]:
             balance = HarmonicResidual(model, model.at(candidate.speed), model.sampling)
             found.append(growth_at(balance, balance.static, candidate.base))
@@ -353,7 +359,7 @@ def _refined(model: HarmonicBalanceModel, speed: float, start: Complexes | None)
     readings = balance.static if start is None else start
     products = 0
     for _ in range(MOST_REFINED):
-        readings, took = solve_balance(balance, readings, ROUGH)
+        balance, readings, took = solve_turning(balance, readings, ROUGH)
         products += took
         lacking = _lacking(balance, readings)
         if lacking is None:
@@ -364,7 +370,7 @@ def _refined(model: HarmonicBalanceModel, speed: float, start: Complexes | None)
         lines = balance.model.with_lines(joined(balance.model.lines, lacking), kinks)
         balance = HarmonicResidual(lines, lines.at(speed), lines.sampling)
         readings = readings_in(before, readings, lines)
-    readings, took = solve_balance(balance, readings)
+    balance, readings, took = solve_turning(balance, readings)
     products += took
     response = response_of_readings(balance, readings, products)
     if _parted(response):
@@ -388,8 +394,7 @@ def _without_aliases(balance: HarmonicResidual, readings: Complexes) -> tuple[Ha
         ahead = HarmonicResidual(denser, balance.interface, denser.sampling)
         if float(np.linalg.norm(ahead.missing(readings)[..., DEFLECTION])) < ALIASED * size:
             break
-        balance = ahead
-        readings, took = solve_balance(balance, readings)
+        balance, readings, took = solve_turning(ahead, readings)
         products += took
     return balance, readings, products
 
@@ -403,9 +408,11 @@ def _lacking(balance: HarmonicResidual, readings: Complexes) -> LineSet | None:
     size = float(np.linalg.norm(readings[1:, :, DEFLECTION]))
     ahead = HarmonicResidual(whole, whole.at(balance.interface.speed), whole.sampling)
     start = readings_in(balance.model, readings, whole)
+    if whole.shaft_orders.sidebands:
+        ahead = ahead.with_turned_loads(start)
     excess, tangent, _ = ahead.forces(start)
     missing = tangent.alone(ahead.answer(excess) + ahead.static - start)
-    new = np.linalg.norm(missing[..., DEFLECTION], axis=1)
+    new = _sizes(whole, missing)
     new[balance.model.places_in(whole)[0]] = 0.0
     wanted = largest(new, MAX_NEGLECTED_NORM * size)
     if wanted.any():
@@ -413,9 +420,15 @@ def _lacking(balance: HarmonicResidual, readings: Complexes) -> LineSet | None:
     return None
 
 
+def _sizes(model: HarmonicBalanceModel, readings: Complexes) -> Floats:
+    """Sizes (n,) of lines in readings (n, m, r), m: deflections, with stated loads also rotations along the pitch."""
+    read = [DEFLECTION, POSITION] if model.shaft_orders.sidebands else [DEFLECTION]
+    return np.asarray(np.linalg.norm((model.lengths * readings)[..., read], axis=(1, 2)))
+
+
 def _thinned(state: ContactLossState, usual: HarmonicBalanceModel) -> tuple[HarmonicBalanceModel, Complexes]:
     """Orders of a state, without negligible ones beyond the usual orders, and its readings in them."""
-    sizes = np.linalg.norm(state.readings[..., DEFLECTION], axis=1)
+    sizes = _sizes(state.model, state.readings)
     needed = np.isin(np.arange(len(sizes)), usual.places_in(state.model)[0])
     sizes[needed] = 0.0
     kept = needed | largest(sizes, DROP_LINE_TOL * float(np.linalg.norm(state.readings[1:, :, DEFLECTION])))

@@ -177,17 +177,22 @@ def check_law(name: str, method: Method) -> None:
 
 
 def check_deviations(gearbox: Gearbox, method: Method) -> None:
-    """Refuse deviations of gears with the method that evaluates the mesh models in time.
+    """Refuse deviations of gears, and trains without meshes, with the method that evaluates the mesh models in time.
 
     Raises
     ------
     SteadyError
-        The gearbox file has deviations or excitations, and the method is ``nonlinear``.
+        The gearbox file has deviations or no meshes, and the method is ``nonlinear``.
     """
-    if (gearbox.deviations or gearbox.varying_loads) and method == "nonlinear":
+    if not gearbox.meshes and method == "nonlinear":
         raise SteadyError(
-            "deviations, excitations: the method nonlinear does not include the orders of the shafts; use --method "
-            "parametric with --mesh-model line_of_action, or exugear run"
+            "meshes: the train has none whose forces the method nonlinear could evaluate; use --method parametric, or "
+            "exugear run"
+        )
+    if gearbox.deviations and method == "nonlinear":
+        raise SteadyError(
+            "deviations: the method nonlinear does not include deviations of gears; use --method parametric with "
+            "--mesh-model line_of_action, or exugear run"
         )
 
 

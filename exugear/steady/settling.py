@@ -163,7 +163,8 @@ class SettlingRun:
         damping = 1.4 * self._inertia * rate
         law = (float(q[pinned]), self._speed, 0.0)
         drive = Drive(assembly.gearbox.case.overall.input, stiffness, damping, law)
-        run = CompiledSystem(assembly, q, v, LoadTable(self._torques, drive=drive), self._step)
+        loads = LoadTable(self._torques, drive=drive, varying=assembly.varying_loads)
+        run = CompiledSystem(assembly, q, v, loads, self._step)
         states = np.empty((self._steps, assembly.size))
         speeds = np.empty_like(states)
         if run.advance(0, states, speeds) < self._steps:

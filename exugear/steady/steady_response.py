@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from functools import partial
 
@@ -380,11 +381,12 @@ def response_of(
 
 
 def _tracks(model: HarmonicBalanceModel, speeds: Floats) -> ModeTracks:
-    """Follow modes that a mesh or one of its harmonics may reach; of elastic bodies, those that their band holds."""
+    """Follow modes that a harmonic of a mesh or a stated load may reach; of elastic bodies, those in their band."""
     assembly = model.waves.assembly
     low = float(speeds.min())
     high = float(speeds.max())
-    highest = HARMONICS * float(model.waves.base_orders.max()) * float(np.abs(speeds).max()) / (2.0 * np.pi)
+    order = max(HARMONICS * float(model.waves.base_orders.max(initial=0.0)), model.shaft_orders.highest_load)
+    highest = order * float(np.abs(speeds).max()) / (2.0 * np.pi)
     if assembly.elastic_bodies:
         highest = min(highest, assembly.gearbox.case.elasticity.band_Hz)
     return modes_over_speed(model.system.frozen, low, high, highest)
@@ -456,7 +458,10 @@ def _solve_from(
 
 
 def _change_with_more(solver: PointSolver, solved: SolvedPoints) -> float:
-    """Return the largest relative change of the highest peaks of the transmission error with more harmonics."""
+    """Return the largest relative change of the highest peaks of the transmission error with more harmonics.
+
+    Peaks at which the method `nonlinear` finds no state from rest are left out.
+    """
     model = solver.model
     if model.is_nonlinear:
         return math.nan
@@ -472,9 +477,10 @@ def _change_with_more(solver: PointSolver, solved: SolvedPoints) -> float:
     changes = [0.0]
     for point, line in found[:CHECKED]:
         place, _ = other.model.lines.find(model.lines.index[line])
-        response = other.response(float(solved.speed[point]))
-        amplitude = 2.0 * abs(complex(signals(other.model, response)[int(place), 0]))
-        changes.append(abs(amplitude / max(float(values[point, line]), 1e-300) - 1.0))
+        with suppress(HarmonicBalanceError):
+            response = other.response(float(solved.speed[point]))
+            amplitude = 2.0 * abs(complex(signals(other.model, response)[int(place), 0]))
+            changes.append(abs(amplitude / max(float(values[point, line]), 1e-300) - 1.0))
     return max(changes)
 
 

@@ -254,7 +254,20 @@ def gearbox_warnings(gearbox: Gearbox) -> tuple[str, ...]:
             lines += narrowed_seats(gearbox, name)
         if section.external is not None:
             lines += external_warnings(gearbox, name)
+        lines += _reactions_at_main_seat(gearbox, name)
     return tuple(dict.fromkeys(lines))
+
+
+def _reactions_at_main_seat(gearbox: Gearbox, name: str) -> Iterator[str]:
+    """Name stated loads whose reaction acts at the main seat of a flexible body, for want of a seat of their own."""
+    section = gearbox.case.bodies[gearbox.body(name).family]
+    table, own = ("solid", section.solid) if section.solid is not None else ("external", section.external)
+    for load in gearbox.varying_loads:
+        if own is not None and load.reaction_on == name and load.excitation not in own.seats:
+            yield (
+                f"excitations.{load.excitation}.reaction_on = {name!r}: the reaction acts at the seat of torques of "
+                f"this flexible body; add [bodies.{name}.{table}.seats.{load.excitation}] where the stator is fastened"
+            )
 
 
 def _build_bearing(gearbox: Gearbox, bearing: Bearing) -> None:

@@ -9,13 +9,15 @@ work.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from exugear.gearbox.gear_parts import thinning_range
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.load_cases import operating_range, summarise_loads
-from exugear.gearbox.parts import Bearing, Body, PairSpec, connector_matrix
+from exugear.gearbox.load_cases import inertia_at_input, operating_range, speeds_beyond_tables, summarise_loads
+from exugear.gearbox.parts import Bearing, Body, PairSpec, VaryingLoad, connector_matrix
 from exugear.gearbox.sections.designations import boundary_of
 from exugear.gearbox.units import MM, RPM, si
 from exugear.system.bodies.seated_items import seat_width
@@ -45,6 +47,12 @@ WHEEL, LEAST_SEAT, LEAST_OVER_SHAFT = 1.5, 0.98, 0.9
 bore of a mounted gear over the bores of the bearings on both sides, and over the shaft under it in the file."""
 OTHER_SIZE, MOST_WALL = 0.01, 4.0
 """Difference of a diameter from that of the designation, and outer diameter of a bearing over its bore."""
+MOST_TURNED = 0.02
+"""Mesh cycles by which a stated torque may turn the gear train; more looks like a missing machine."""
+BALANCE_GRADES = (0.4, 1.0, 2.5, 6.3, 16.0, 40.0)
+"""Balance quality grades G of ISO 21940-11, mm/s, up to the largest of gearboxes and electric machines."""
+LEAST_PER_GRADE = 3.0
+"""Unbalance (g mm) that G 1 permits, above which the number of a grade is not taken for an unbalance."""
 SELF_ALIGNING = ("self_aligning_ball", "spherical_roller", "thrust_spherical_roller")
 """Types of bearings that do not resist tilting with any number of rows; of the others, a single row barely does."""
 
@@ -61,6 +69,7 @@ def part_warnings(gearbox: Gearbox) -> Iterator[str]:
     yield from shafts_on_one_bearing(gearbox)
     yield from _faces_in_bearings(gearbox)
     yield from _speed_limits(gearbox)
+    yield from _excitations(gearbox)
 
 
 def _speed_limits(gearbox: Gearbox) -> Iterator[str]:
@@ -529,3 +538,88 @@ def _clear_tip_diameter(pair: GearPair, mate: Gear) -> float:
     else:
         roll = on_other + pair.base_tangent_length if mate.internal else pair.base_tangent_length - on_other
     return 2.0 * math.hypot(mate.base_radius, roll)
+
+
+def _excitations(gearbox: Gearbox) -> Iterator[str]:
+    """Compare stated loads with static torques, with the inertia that they turn, and with the unbalanced mass."""
+    slowest, fastest = operating_range(gearbox) or (0.0, 0.0)
+    if not gearbox.varying_loads or fastest == 0.0:
+        return
+    if beyond := speeds_beyond_tables(gearbox, slowest, fastest):
+        yield f"{beyond} of [operation]"
+    turns = gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
+    bodies = {body.name: body for body in gearbox.bodies()}
+    loads: dict[tuple[str, str], list[VaryingLoad]] = {}
+    for load in gearbox.varying_loads:
+        loads.setdefault((load.excitation, load.body), []).append(load)
+    for (name, body), own in loads.items():
+        ratio = abs(turns.get(body, 0.0))
+        if ratio == 0.0:
+            continue
+        yield from _large_torques(gearbox, own, ratio * fastest)
+        yield from _turned_train(gearbox, own, ratio, slowest)
+        unbalance = gearbox.case.excitations[name].unbalance_g_mm
+        if unbalance is not None:
+            key = f"excitations.{name}.unbalance_g_mm = {unbalance:g}"
+            yield from _balance(key, unbalance, bodies[body], ratio * fastest)
+
+
+def _torque_of(load: VaryingLoad, speed: float) -> float:
+    """Amplitude of the torque of a stated load at a speed of its body (rad/s), N m."""
+    factor: float = speed**load.exponent
+    if load.curve:
+        factor = float(np.interp(speed, [row[0] for row in load.curve], [row[1] for row in load.curve]))
+    return abs(load.wrench[5]) * factor
+
+
+def _large_torques(gearbox: Gearbox, loads: Sequence[VaryingLoad], speed: float) -> Iterator[str]:
+    """Compare the torques of an excitation at a speed of its body (rad/s) with the static torque that this carries."""
+    name, body = loads[0].excitation, loads[0].body
+    forces = gearbox.train.static_mesh_forces()
+    carried = [abs(gearbox.train.static_torques.get(body, 0.0))]
+    for mesh in gearbox.meshes:
+        gears = {mesh.pinion: mesh.pair.pinion, mesh.gear: mesh.pair.gear}
+        carried += [abs(forces[mesh.name]) * gear.base_radius for on, gear in gears.items() if on == body]
+    amplitude = sum(_torque_of(load, speed) for load in loads)
+    if amplitude > max(carried) > 0.0:
+        yield (
+            f"excitations.{name}: amplitude of {amplitude:.4g} N m on {body} at {speed / RPM:.4g} rpm, above the "
+            f"static torque of {max(carried):.4g} N m, so that teeth lose contact; check the unit, or use "
+            "--mesh-model table with --method nonlinear, or exugear run"
+        )
+
+
+def _turned_train(gearbox: Gearbox, loads: Sequence[VaryingLoad], ratio: float, slowest: float) -> Iterator[str]:
+    """Compute how far a torque turns the free gear train, T / (J (n Omega)^2), at the lowest operating speed.
+
+    `ratio` is the speed of the body over that of the input.
+    """
+    if gearbox.train.degrees_of_freedom > 1 or slowest == 0.0:
+        return
+    cycles = max(gearbox.train.mesh_frequencies(1.0).values(), default=0.0)
+    inertia = inertia_at_input(gearbox)
+    turned = [
+        cycles * ratio * _torque_of(load, ratio * slowest) / (inertia * (load.order * ratio * slowest) ** 2)
+        for load in loads
+    ]
+    largest = max(turned)
+    if largest > MOST_TURNED:
+        load = loads[turned.index(largest)]
+        yield (
+            f"excitations.{load.excitation}: its order {load.order:g} turns the gear train by {largest:.2g} mesh "
+            f"cycles at {slowest / RPM:.4g} rpm of {gearbox.case.overall.input}; low orders are far too high without "
+            "the inertias of the connected machines: add these as bodies with couplings"
+        )
+
+
+def _balance(key: str, unbalance: float, body: Body, speed: float) -> Iterator[str]:
+    """Compare an unbalance (g mm) with grades of ISO 21940-11: unbalance times speed (rad/s) over mass, mm/s."""
+    per_grade = 1e3 * body.mass / speed
+    if per_grade == 0.0:
+        return
+    of = f"{body.mass:.4g} kg at {speed / RPM:.4g} rpm"
+    if unbalance / per_grade > BALANCE_GRADES[-1]:
+        yield f"{key}: balance quality grade G {unbalance / per_grade:.3g} of {of} (ISO 21940-11); check the unit"
+    elif unbalance in BALANCE_GRADES and per_grade > LEAST_PER_GRADE:
+        permitted = f"{unbalance * per_grade:.3g} g mm"
+        yield f"{key}: looks like a balance quality grade; G {unbalance:g} of {of} permits {permitted}"

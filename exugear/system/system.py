@@ -369,20 +369,21 @@ class Assembly(ReprMixin):
     ) -> tuple[Integers, Complexes]:
         """Coordinates (k,) and generalized forces (k,) of a force and moment (6,), N and N m, on a body at a place (m).
 
-        Without a place they act at its main seat, or at the body. Coordinates that the body does not have are left out.
+        On a flexible body they act at the seat named after the force, or at its main seat. Coordinates that the body
+        does not have are left out.
         """
         where = self.coordinates.get(body, (-1,) * BODY_SIZE)
         arm = np.zeros(3)
         elastic = self.elastic_bodies.get(body)
-        if position is not None and elastic is None:
-            arm = position - node_position(next(own for own in self.gearbox.bodies(self.inertias) if own.name == body))
-        elif position is not None and elastic is not None:
+        if elastic is not None:
             places = {seat.name: np.array(seat.position) for seat in elastic.reduced.seats}
             seat = elastic.shared_seats.get(name, name)
             if seat not in places:
                 seat = elastic.main_seat
             where = self.coordinates[seat_key(body, seat)]
-            arm = position - places[seat]
+            arm = arm if position is None else position - places[seat]
+        elif position is not None:
+            arm = position - node_position(next(own for own in self.gearbox.bodies(self.inertias) if own.name == body))
         acting = np.append(wrench[:3], wrench[3:] + np.cross(arm, wrench[:3]))
         index = np.array(where, dtype=np.int64)
         moves = (index >= 0) & (acting != 0.0)

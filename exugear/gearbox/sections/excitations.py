@@ -23,8 +23,8 @@ class ExcitationSection(Section):
     """Load on a rotating body that varies with its angle: an electric machine, an engine, a propeller, an unbalance.
 
     A torque, force or moment is the sum of A cos(order x angle + phase) over the orders, in addition to constant loads.
-    It acts in runs, and in steady-state responses with the methods `linear` and `parametric`. In the variant `rigid`
-    ideal joints react forces and moments. On a flexible shaft a seat is added at `z_mm`.
+    It acts in runs and in steady-state responses. In the variant `rigid` ideal joints react forces and moments. On a
+    flexible shaft a seat is added at `z_mm`.
     """
 
     body: Name
@@ -63,6 +63,7 @@ class ExcitationSection(Section):
     """Speed of the body at which the amplitudes are as stated; required with `speed_exponent`."""
     reaction_on: Name | None = None
     """Body on which the opposite acts, such as the housing with the stator; a rigid fixed body takes it to the ground.
+    A flexible housing takes it at the seat that has the name of the excitation, otherwise at its seat of torques.
     """
     enabled: bool = True
     """Whether it acts."""

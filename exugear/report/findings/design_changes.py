@@ -197,7 +197,7 @@ def _number(value: float | None) -> float | None:
 
 
 def multiples_of(data: xr.Dataset, order: float, families: Collection[str]) -> dict[str, int]:
-    """Return the multiples of mesh orders that make up an order, without sidebands at the rotation of a carrier.
+    """Return the multiples of mesh orders and rotations that make up an order, without sidebands of passing planets.
 
     Parameters
     ----------
@@ -206,17 +206,21 @@ def multiples_of(data: xr.Dataset, order: float, families: Collection[str]) -> d
 
     Returns
     -------
-    By the families of meshes that share a mesh order, separated by commas
+    By the families of meshes that share a mesh order, separated by commas, and by rotations of bodies
     """
     line = int(np.argmin(np.abs(data["order"].to_numpy() - order)))
-    return {base: int(counts[line]) for base, counts in _mesh_multiples(data, families).items() if counts[line]}
+    return {base: int(counts[line]) for base, counts in _base_multiples(data, families).items() if counts[line]}
 
 
-def _mesh_multiples(data: xr.Dataset, families: Collection[str]) -> dict[str, Integers]:
-    """Multiples (line,) of each mesh order."""
+def _base_multiples(data: xr.Dataset, families: Collection[str]) -> dict[str, Integers]:
+    """Multiples (line,) of each mesh order and of each rotation that stated loads or deviations have."""
     multiples = data["index"].to_numpy()
     bases = enumerate(str(base) for base in data["base"].to_numpy())
-    return {base: multiples[:, place] for place, base in bases if set(base.split(", ")) <= set(families)}
+    return {
+        base: multiples[:, place]
+        for place, base in bases
+        if set(base.split(", ")) <= set(families) or "rotation of " in base
+    }
 
 
 def peaks_of(
@@ -233,15 +237,16 @@ def peaks_of(
     Parameters
     ----------
     data : as `exugear.steady.steady_file.load_response` reads it
-    multiples : of mesh orders, as `multiples_of` returns them; they are the same with other numbers of teeth
+    multiples : as `multiples_of` returns them; they are the same with other numbers of teeth
     families : families of meshes of the gearbox
     frequency : of the resonance, Hz
     inside : lowest and highest speed of the range, rad/s
     """
     speeds = np.abs(data["speed"].to_numpy())
     amplitude = complex_amplitudes(data)[:, 1:]
-    of_order = np.ones(data.sizes["line"], bool)
-    for base, counts in _mesh_multiples(data, families).items():
+    bases = _base_multiples(data, families)
+    of_order = np.full(data.sizes["line"], set(multiples) <= set(bases))
+    for base, counts in bases.items():
         of_order &= counts == multiples.get(base, 0)
     frequencies = np.outer(speeds, data["order"].to_numpy()) / (2.0 * np.pi)
     near = (of_order & (np.abs(frequencies - frequency) <= NEAR * frequency))[:, 1:]

@@ -35,7 +35,7 @@ STIFFER = 1.3
 SAME_PHASING = 0.1
 """Difference of the resultant of planet phases, 1 for meshes in phase, below which the phasing counts as the same."""
 ASSUMPTION = "assumption"
-GROUPS = ("gear", "modification", "bearing", ASSUMPTION)
+GROUPS = ("gear", "modification", "bearing", "coupling", ASSUMPTION)
 """Groups of changes, in the order of the table."""
 
 
@@ -60,6 +60,8 @@ def propose_changes(
     multiples: Mapping[str, int],
     deflections: Mapping[str, float],
     bearings: Sequence[str],
+    couplings: Sequence[str] = (),
+    excitations: Sequence[str] = (),
 ) -> list[DesignChange]:
     """Propose changes for a resonance.
 
@@ -67,7 +69,8 @@ def propose_changes(
     ----------
     multiples : of the mesh frequency that excite it, by the family of meshes
     deflections : mean static transmission error of each pair, m
-    bearings : families of the bearings that have a large fraction of its strain energy
+    bearings, couplings : families of bearings, and couplings, that have a large fraction of its strain energy
+    excitations : stated loads that have its order
     """
     pairs = {mesh.pair.name: mesh.pair for mesh in gearbox.meshes if mesh.family in multiples}
     changes: list[DesignChange] = []
@@ -77,8 +80,23 @@ def propose_changes(
     changes += _phasing_changes(gearbox, multiples)
     for name in bearings:
         changes += _bearing_changes(gearbox, name)
+    for name in couplings:
+        stiffness = {f"couplings.{name}.stiffness_N_m_per_rad": gearbox.case.couplings[name].stiffness_N_m_per_rad}
+        changes += _scaled(name, "coupling", stiffness)
+    for name in excitations:
+        words = f"without the excitation {name}"
+        changes.append(DesignChange(f"{name}-none", words, ASSUMPTION, {f"excitations.{name}.enabled": False}))
     changes += _assumptions(gearbox)
     return changes
+
+
+def _scaled(name: str, group: str, stated: Mapping[str, float]) -> Iterator[DesignChange]:
+    """Larger and smaller values of stated stiffnesses of a part, by their keys; none if nothing is stated."""
+    for factor, words in ((STIFFER, "stiffer"), (1.0 / STIFFER, "softer")):
+        keys = {key: factor * value for key, value in stated.items()}
+        if keys:
+            share = f"{100.0 * abs(factor - 1.0):.0f} %"
+            yield DesignChange(f"{name}-{words}", f"{name}: {share} {words}", group, keys)
 
 
 def _gear_names(gearbox: Gearbox, pair: str) -> tuple[str, str]:
@@ -306,11 +324,7 @@ def _bearing_changes(gearbox: Gearbox, family: str) -> list[DesignChange]:
             changes.append(DesignChange(f"{family}-clearance", words, "bearing", keys))
     elif section.stiffness is not None:
         stated = {key: value for key, value in section.stiffness if key.endswith(("N_per_m", "m_per_rad")) and value}
-        for factor, words in ((STIFFER, "stiffer"), (1.0 / STIFFER, "softer")):
-            keys = {f"{place}.stiffness.{key}": factor * value for key, value in stated.items()}
-            if keys:
-                share = f"{100.0 * abs(factor - 1.0):.0f} %"
-                changes.append(DesignChange(f"{family}-{words}", f"{family}: {share} {words}", "bearing", keys))
+        changes += _scaled(family, "bearing", {f"{place}.stiffness.{key}": value for key, value in stated.items()})
     if changes:
         return changes
     kind = "bearing" if catalogue is None else f"{catalogue.type.replace('_', ' ')} bearing"

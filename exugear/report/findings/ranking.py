@@ -593,7 +593,8 @@ def highest_drawn(gearbox: Gearbox, response: xr.Dataset, ranking: Ranking | Non
     """
     fastest = float(np.abs(response["speed"]).max())
     first = () if ranking is None else ranking.resonances[:DRAWN]
-    return TOP * max(*gearbox.train.mesh_frequencies(fastest).values(), *(own.frequency for own in first))
+    frequencies = [*gearbox.train.mesh_frequencies(fastest).values(), *(own.frequency for own in first)]
+    return TOP * max(frequencies, default=0.0)
 
 
 def response_spectra(

@@ -193,14 +193,8 @@ class Labels:
         >>> words.causes(6 * grc.train.ratio), words.causes(6.0)
         (' (air gap)', '')
         """
-        loads = self._gearbox.varying_loads
-        if not loads:
-            return ""
-        speeds = self._gearbox.train.rolling_speeds(self._gearbox.case.overall.input, 1.0)
-        acting = [
-            own.excitation for own in loads if math.isclose(own.order * abs(speeds[own.body]), order, rel_tol=1e-6)
-        ]
-        return f" ({before}{', '.join(map(self.of, dict.fromkeys(acting)))})" if acting else ""
+        acting = excitations_at(self._gearbox, order)
+        return f" ({before}{', '.join(map(self.of, acting))})" if acting else ""
 
     def _rotation_sentence(self, order: float, body: str, carrier: str | None) -> str:
         """Return an order of a body's rotation as a noun phrase."""
@@ -264,6 +258,18 @@ class Labels:
             words = mesh + self.of(self.family(itself)) + (" itself" if itself != name else "")
             gathered[words] = gathered.get(words, 0.0) + share
         return dict(sorted(gathered.items(), key=lambda item: -item[1]))
+
+
+def excitations_at(gearbox: Gearbox, order: float) -> list[str]:
+    """Names of the stated loads that have an order (periods per revolution of the input)."""
+    speeds = gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
+    return list(
+        dict.fromkeys(
+            own.excitation
+            for own in gearbox.varying_loads
+            if math.isclose(own.order * abs(speeds[own.body]), order, rel_tol=1e-6)
+        )
+    )
 
 
 def percentages(shares: Mapping[str, float], most: int = SHOWN_ELEMENTS, least: float = 0.01) -> str:

@@ -312,7 +312,7 @@ def _rays(frame: Frame, lines: Iterable[tuple[OrderLine, str]], highest: float, 
     rays: list[OrderRay] = []
     families: dict[str, int] = {}
     for line, label in lines:
-        number, _, family = line.name.rpartition(" × ")
+        number, family = _split(line.name)
         end = frame.speeds[1]
         reach = min(1.0, highest / float(line.frequency(end * RPM)))
         x = frame.x(reach * end)
@@ -327,5 +327,19 @@ def _rays(frame: Frame, lines: Iterable[tuple[OrderLine, str]], highest: float, 
         apart = min((abs(math.radians(angle - other.label.angle)) for other in rays if other.label.text), default=1.0)
         if apart * along * length < BETWEEN_LABELS:
             mark = Mark(0.0, 0.0, "")
-        rays.append(OrderRay(x, y, families.setdefault(family, len(families)), int(number or 1), mark))
+        rays.append(OrderRay(x, y, families.setdefault(family, len(families)), number, mark))
     return rays
+
+
+def _split(name: str) -> tuple[int, str]:
+    """Split the name of an order into the leading multiple and what follows it.
+
+    Examples
+    --------
+    >>> _split("2 × high_speed"), _split("spur - 12 × rotation of rotor")
+    ((2, 'high_speed'), (1, 'spur - 12 × rotation of rotor'))
+    """
+    multiple, times, family = name.partition(" × ")
+    if times and multiple.isdecimal():
+        return int(multiple), family
+    return 1, name

@@ -43,6 +43,8 @@ SHOWN_FRACTIONS = 2
 """Number of listed fractions of an energy."""
 SHOWN_CHANGES = 3
 """Number of listed design changes."""
+LEAST_SHARE = 0.01
+"""Minimum share of an excitation of the file that is listed."""
 SHOWN_SHORTFALLS = 2
 """Number of listed parts whose life falls short."""
 STRIPS = ((690.0, 312.0), (352.0, 440.0))
@@ -256,8 +258,11 @@ def _cause_box(material: ReportData, headline: Headline, top: Resonance, known: 
     found = excitations(material.context, material.results)
     causes = causes_of(material.context, material.words, top, found, known)
     line = material.words.order(top.line, top.order)
+    sources = {} if known is None else known.meshes
+    excitations_of_file = material.context.gearbox.case.excitations
+    shares = [(name, sources[name]) for name in excitations_of_file if abs(sources.get(name, 0.0)) >= LEAST_SHARE]
     if not causes:
-        return Box(f"Excited by {material.words.line_sentence(line)}.", link="gears")
+        return Box(f"Excited by {material.words.line_sentence(line)}.", _share_facts(material, shares), link="gears")
     first = causes[0]
     text = short(
         f"Excited by {material.words.line_sentence(line)}.",
@@ -265,10 +270,8 @@ def _cause_box(material: ReportData, headline: Headline, top: Resonance, known: 
         f"±{rounded_text(1e6 * first.amplitude)} µm.",
     )
     facts = []
-    shared = [cause for cause in causes if cause.share is not None]
-    if shared:
-        shares = ", ".join(f"{material.words.of(cause.pair)} {100.0 * (cause.share or 0.0):.0f} %" for cause in shared)
-        facts.append(("TE contribution", shares))
+    of_pairs = [(cause.pair, cause.share) for cause in causes if cause.share is not None]
+    facts += _share_facts(material, [*of_pairs, *shares])
     if LAWS[headline.choice.mesh_model].moves_load and not headline.choice.variant.spins_only:
         context = material.context
         moved = {own.pair: own for own in shuttling_pairs(context.gearbox, context.folder, first.harmonic)}
@@ -285,6 +288,12 @@ def _cause_box(material: ReportData, headline: Headline, top: Resonance, known: 
         overlap += "; with a whole number the total contact length is constant"
     facts.append(("Overlap ratio", overlap))
     return Box(text, facts, link="gears")
+
+
+def _share_facts(material: ReportData, shares: Sequence[tuple[str, float]]) -> list[tuple[str, str]]:
+    """Return the shares of pairs and excitations in the transmission error as a fact; none without shares."""
+    text = ", ".join(f"{material.words.of(name)} {100.0 * share:.0f} %" for name, share in shares)
+    return [("TE contribution", text)] if text else []
 
 
 def _remedy_box(material: ReportData, headline: Headline) -> Box:

@@ -207,7 +207,7 @@ class HarmonicBalanceModel:
         self._usual = self._reach = HarmonicTruncation(2 * harmonics, 2 * combinations)
         self.lines = self._lines_within(HarmonicTruncation(harmonics, combinations))
         # Only forces that are evaluated in time need it, and these are not with a flexible ring gear.
-        self.larger = self.lines if waves.neighbours else self._lines_within(self._usual)
+        self.larger = self.lines if waves.neighbours else self._lines_within(self._usual, products=True)
         self._least = 0
         # Shared by all that differ in their lines alone.
         self._lattices: dict[tuple[HarmonicTruncation, int, int], TorusSampling] = {}
@@ -337,7 +337,7 @@ class HarmonicBalanceModel:
         if not clear:
             other._least = 0
         if reach != self._reach:
-            other._reach, other.larger, other._least = reach, self._lines_within(reach), 0
+            other._reach, other.larger, other._least = reach, self._lines_within(reach, products=True), 0
         return other
 
     def with_system(self, system: MeanSystem) -> HarmonicBalanceModel:
@@ -361,8 +361,11 @@ class HarmonicBalanceModel:
         other.lines = self.lines.part(which)
         return other
 
-    def _lines_within(self, reach: HarmonicTruncation) -> LineSet:
-        """Orders up to a limit, with the sidebands of planets that mesh out of phase, and the orders of shafts."""
+    def _lines_within(self, reach: HarmonicTruncation, products: bool = False) -> LineSet:
+        """Orders up to a limit, with the sidebands of planets that mesh out of phase, and the orders of shafts.
+
+        With `products`, sums and differences of the orders of two stated loads are among them.
+        """
         waves = self.waves
         lines = line_set(waves.base_orders.tolist(), reach.harmonics, reach.combinations)
         modulators = [planets for _, planets in waves.carriers]
@@ -371,7 +374,8 @@ class HarmonicBalanceModel:
         else:
             lines = beside(lines, modulators, 0) if waves.passing else modulated(lines, modulators)
         slow = self.shaft_orders
-        return with_rotations(lines, slow.rotations, slow.sidebands, len(waves.base_orders), reach.harmonics)
+        sidebands = slow.sidebands + (slow.products if products else ())
+        return with_rotations(lines, slow.rotations, sidebands, len(waves.base_orders), reach.harmonics)
 
     @cached_property
     def without_shaft_orders(self) -> HarmonicBalanceModel:
@@ -396,7 +400,7 @@ class HarmonicBalanceModel:
             other.lines = joined(self.lines, beside(more, [planets for _, planets in self.waves.carriers], 0))
             return other
         other.lines = self._lines_within(HarmonicTruncation(harmonics, combinations // 2))
-        other.larger = self._lines_within(other._usual)
+        other.larger = self._lines_within(other._usual, products=True)
         return other
 
     @cached_property
@@ -406,7 +410,7 @@ class HarmonicBalanceModel:
         usual = self._usual
         other.lines = self._lines_within(HarmonicTruncation(usual.harmonics, usual.combinations // 2))
         other._reach = HarmonicTruncation(2 * usual.harmonics, usual.combinations)
-        other.larger = self._lines_within(other._reach)
+        other.larger = self._lines_within(other._reach, products=True)
         return other
 
     def _copied(self) -> HarmonicBalanceModel:
@@ -421,11 +425,11 @@ class HarmonicBalanceModel:
         """Return a copy with one more multiple of the planet passing as sidebands of strong orders, by a mask (n,).
 
         Planets tilt unequally under load, and table models include this: each passing planet then modulates all orders,
-        which adds sidebands. None if planets are not modelled individually.
+        which adds sidebands. None if planets are not modelled individually, as under stated loads.
         """
         waves = self.waves
         usual = self._usual
-        if not self.loses_contact or self.bearings is not None:
+        if not self.loses_contact or self.bearings is not None or self.shaft_orders.sidebands:
             return None
         if (waves.carriers and not waves.passing) or not any(wave.wave for wave in waves.waves):
             return None
@@ -677,12 +681,16 @@ class HarmonicBalanceModel:
         self, speed: float, pencil: tuple[Floats, Floats], frequencies: Floats
     ) -> LoadResponse | None:
         """Solve for the response to these loads at a speed of the input, rad/s; None without any."""
-        system = self.system
         if not (self._friction.size or self.shaft_orders.sidebands):
             return None
         loads = self.shaft_loads(speed)
         if self._friction.size:
-            loads += system.at(self._friction, speed)
+            loads += self.system.at(self._friction, speed)
+        return self._response_to(loads, pencil, frequencies)
+
+    def _response_to(self, loads: Complexes, pencil: tuple[Floats, Floats], frequencies: Floats) -> LoadResponse:
+        """Solve for the response to loads (n, size) in the rotating frame, with stiffness and damping at a speed."""
+        system = self.system
         motion = np.zeros(loads.shape, dtype=complex)
         still = system.still(pencil[0], loads[0].real[:, None])[:, 0]
         motion[0] = still[:-1]
@@ -692,6 +700,17 @@ class HarmonicBalanceModel:
             ..., 0
         ]
         return LoadResponse(loads, motion, float(still[-1]))
+
+    def with_turned_loads(self, interface: Interface, motion: Complexes) -> Interface:
+        """Return the interface with stated loads at the angles to which a motion (n, size) turns their bodies."""
+        speed = interface.speed
+        system = self.system
+        change = self.shaft_orders.change_by_turning(self.sampling, motion, speed, system.static_at(speed))
+        loads = self.shaft_loads(speed) + self.sampling.coefficients(change)
+        if self._friction.size:
+            loads += system.at(self._friction, speed)
+        pencil = system.stiffness_at(speed), system.damping_at(speed)
+        return replace(interface, loads=self._response_to(loads, pencil, interface.frequencies))
 
     def _bearings_at(self, speed: float) -> BearingMean | None:
         """Nonlinear bearings in the averaged system at a speed of the input, rad/s; None without any."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -45,6 +45,8 @@ STEP_TOLERANCE = 1e-3
 MOST_STEPS = 40
 PATIENCE, STALLED = 6, 0.5
 """Newton steps over which the residual has to fall to this share, or the search is given up."""
+MOST_TURNS = 12
+"""Times that stated loads are turned with their bodies at most."""
 SHORTEST = 1.0 / 64.0
 """Share of a Newton step to which it is halved while it does not lower the residual."""
 
@@ -334,6 +336,11 @@ class HarmonicResidual:
         """Find what is missing to the balance (n, m, r)."""
         return readings - self.static - self.answer(self.forces(readings)[0])
 
+    def with_turned_loads(self, readings: Complexes) -> HarmonicResidual:
+        """Return the balance with stated loads turned by the motion that readings (n, m, r) belong to."""
+        motion = response_of_readings(self, readings).motion
+        return replace(self, interface=self.model.with_turned_loads(self.interface, motion))
+
     def answer(self, excess: Complexes) -> Complexes:
         """Find the readings -G F (n, m, r) under forces (n, m, f)."""
         shape = self.interface.readings.shape
@@ -393,8 +400,37 @@ def nonlinear_response(
         Newton's method found no balance from this start.
     """
     balance = HarmonicResidual(model, interface, sampling)
-    readings, products = solve_balance(balance, balance.static if start is None else start)
+    balance, readings, products = solve_turning(balance, balance.static if start is None else start)
     return response_of_readings(balance, readings, products), readings
+
+
+def solve_turning(
+    balance: HarmonicResidual, readings: Complexes, enough: float = BALANCED
+) -> tuple[HarmonicResidual, Complexes, int]:
+    """Solve the balance with stated loads that turn with the vibration of their bodies; parameters of `solve_balance`.
+
+    Where the loads do not settle, as near standstill where they turn the free gear train by more than a period, they
+    are at the angles of the mean speed.
+    """
+    still = balance
+    readings, products = solve_balance(balance, readings, enough)
+    if not balance.model.shaft_orders.sidebands:
+        return balance, readings, products
+    size = float(np.linalg.norm(balance.static[..., DEFLECTION]))
+    change = np.inf
+    for _ in range(MOST_TURNS):
+        turned = balance.with_turned_loads(readings)
+        before = change
+        change = float(np.linalg.norm((turned.static - balance.static)[..., DEFLECTION])) / size
+        if change <= enough:
+            return balance, readings, products
+        if change > before:
+            break
+        balance = turned
+        readings, took = solve_balance(balance, readings, enough)
+        products += took
+    readings, took = solve_balance(still, readings, enough)
+    return still, readings, products + took
 
 
 def solve_balance(balance: HarmonicResidual, readings: Complexes, enough: float = BALANCED) -> tuple[Complexes, int]:

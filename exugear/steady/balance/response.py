@@ -182,6 +182,8 @@ def _products(
     model: HarmonicBalanceModel, spectra: Spectra, ports: MeshInterface, speed: float, values: Complexes
 ) -> Complexes:
     """Products (n, m, f) of values (n, m, f) with functions of the mesh cycles."""
+    if not values.size:  # a train without meshes
+        return values
     functions = model.coupled(spectra, ports, speed)
     return model.coupling.of(functions, values.reshape(len(values), -1)).reshape(values.shape)
 
@@ -191,8 +193,10 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
 
     The equations y = y_static - G (K y - given) of all lines are solved with readings as lengths, l y. Where gears have
     deviations, the position moves with the orders of their shafts, too: what that adds to the forces is given by the
-    solution before (`forces_of_positions`).
+    solution before (`forces_of_positions`). Without meshes it is the response of the method `linear`.
     """
+    if not model.waves.waves:
+        return linear_response(model, interface)
     shape = len(model.lines.index), *interface.ports.forces.shape[:2]
     lengths = model.lengths[: shape[1], : shape[2]].ravel()
     answers = lengths[:, None] * interface.deflection_per_force

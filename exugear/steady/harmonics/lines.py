@@ -263,8 +263,8 @@ class Sidebands:
 
     multiples: tuple[int, ...]
     """Of all bases that follow those of the meshes."""
-    base: int
-    """Base of the mesh frequency."""
+    base: int | None = None
+    """Base of the mesh frequency; None for the multiples by themselves."""
     reach: int | None = None
     """Highest harmonic of the mesh frequency; None for all of a line set."""
 
@@ -295,9 +295,11 @@ def with_rotations(
     more = []
     for beside_mesh in sidebands:
         reach = harmonics if beside_mesh.reach is None else min(harmonics, beside_mesh.reach)
+        reach = 0 if beside_mesh.base is None else reach
         own = np.zeros((2 * reach + 1, len(bases)), dtype=np.int64)
         own[:, meshes:] = beside_mesh.multiples
-        own[:, beside_mesh.base] = np.arange(-reach, reach + 1)
+        if beside_mesh.base is not None:
+            own[:, beside_mesh.base] = np.arange(-reach, reach + 1)
         more.append(own)
     # Rotations lead the search for common frequencies: meshes are whole multiples of them, however many teeth.
     lead = [*range(first, len(bases)), *range(meshes)]
@@ -344,7 +346,7 @@ def _lines_of_rows(rows: Integers, bases: Floats, units: Integers) -> LineSet:
 
     Of lines at one frequency that of one base alone stands for all, else that with the smallest multiples.
     """
-    rows = rows.astype(np.int64).reshape(-1, bases.size)
+    rows = rows.astype(np.int64).reshape(len(rows), bases.size)
     rows = np.where((rows @ bases < 0.0)[:, None], -rows, rows)
     simplest = sorted(map(tuple, rows.tolist()), key=lambda row: (np.count_nonzero(row), sum(map(abs, row)), row))
     kept: dict[tuple[int, ...], tuple[int, ...]] = {(0,) * units.shape[1]: (0,) * bases.size}

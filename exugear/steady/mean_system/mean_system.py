@@ -144,7 +144,8 @@ class MeanSystem(ReprMixin):
 
         The pencil is stiffness and damping at a speed.
         """
-        solve_side_by_side(self._plan, *pencil, self.mass, frequencies, loads, out)
+        if loads.shape[1]:  # a train without meshes has no unit loads
+            solve_side_by_side(self._plan, *pencil, self.mass, frequencies, loads, out)
 
     def dynamic(self, speed: float, frequency: float) -> Complexes:
         """Dynamic stiffness (size, size) at a speed of the input and an angular frequency, rad/s."""
@@ -306,8 +307,8 @@ def _check(assembly: Assembly) -> None:
             f"the gear train has {gearbox.train.degrees_of_freedom} degrees of freedom; the steady-state response "
             "requires one: fix a body or couple two"
         )
-    if not gearbox.meshes:
-        raise SteadyError("the gear train has no meshes and no excitation; use exugear run instead")
+    if not gearbox.meshes and not gearbox.varying_loads:
+        raise SteadyError("the train has no meshes and no [excitations]; add an excitation, or use exugear run")
     _check_ring(assembly, assembly.elastic_bodies)
     if gearbox.pin_offsets:
         raise SteadyError(

@@ -25,7 +25,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from exugear.steady.harmonics.lines import SAME, LineSet, Rotation, Sidebands, fourier_coefficients, largest
+from exugear.steady.harmonics.lines import (
+    SAME,
+    LineSet,
+    Rotation,
+    Sidebands,
+    TorusSampling,
+    fourier_coefficients,
+    largest,
+)
 from exugear.steady.mean_system.mesh_waves import MeshWaves
 from exugear.steady.mean_system.planet_sets import PlanetSet
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
@@ -72,11 +80,26 @@ class ShaftOrders:
     """(l,) speed of the body of each stated load over that of the input."""
     angles: Floats = field(default_factory=lambda: np.zeros((0, 0)))
     """(l, size) angle of that body by the static deflections, at zero angle of the input."""
+    on_planet: Booleans = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    """(l,) whether that body is a planet."""
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the rotations."""
         return tuple(rotation.name for rotation in self.rotations)
+
+    @property
+    def highest_load(self) -> float:
+        """Highest order of a stated load over the rotation of the input; 0 without any."""
+        return float(np.max(np.abs(self.speeds) * self.loads.order, initial=0.0))
+
+    @property
+    def products(self) -> tuple[Sidebands, ...]:
+        """Sums and differences of the orders of two stated loads, which nonlinear forces add to these."""
+        orders = {own.multiples for own in self.sidebands if own.base is None}
+        both = itertools.product(orders, orders, (1, -1))
+        sums = {tuple(a + sign * b for a, b in zip(one, other, strict=True)) for one, other, sign in both}
+        return tuple(Sidebands(multiples) for multiples in sorted(sums) if any(multiples))
 
     def reaction_at(self, speed: float, static: Floats) -> Complexes:
         """Generalized forces (t, size) at a speed of the input (rad/s) and static deflections (size,)."""
@@ -86,6 +109,27 @@ class ShaftOrders:
             size, phase = size_and_phase(n, speed * self.speeds[n], self.loads)
             factors[self.load == n] = cmath.rect(size, phase + angles[n])
         return np.asarray(self.reaction * factors[:, None])
+
+    def change_by_turning(self, sampling: TorusSampling, motion: Complexes, speed: float, static: Floats) -> Floats:
+        """Sample how generalized forces (samples, size) of stated loads change with the turning of their bodies.
+
+        An angle d that a vibration adds to that of a body multiplies a load of order n by exp(i n d). Loads on single
+        planets are left as they are.
+
+        Parameters
+        ----------
+        motion : (lines, size) about the static state, in the rotating frame
+        speed : of the input, rad/s
+        static : (size,) deflections
+        """
+        sense = math.copysign(1.0, speed)
+        own = np.flatnonzero((self.load >= 0) & ~self.on_planet[self.load])
+        loads = self.load[own]
+        added = self.loads.order[loads] * sampling.values(motion @ self.angles.T)[:, loads]
+        first = sampling.angles.shape[1] - self.multiples.shape[1]
+        angles = sampling.angles[:, first:] @ self.multiples[own].T
+        turned = np.exp(1j * (sense * angles + added)) - np.exp(1j * sense * angles)
+        return np.asarray(2.0 * (turned @ self.reaction_at(speed, static)[own]).real)
 
     def places(self, lines: LineSet, meshes: int) -> Places:
         """Places of the terms in lines of which `meshes` bases are meshes."""
@@ -160,8 +204,8 @@ class _Series:
         """Order of each rotation, by its name; those of carriers whose planets mesh out of phase come first."""
         self.displacement: dict[tuple[int, Key], Complexes] = {}
         self.reaction: dict[tuple[int, Key], Complexes] = {}
-        self.beside: list[tuple[Key, int, int | None]] = []
-        """Rotations, the base of the mesh beside whose harmonics they appear, and the highest of these."""
+        self.beside: list[tuple[Key, int | None, int | None]] = []
+        """Rotations, the base of the mesh beside whose harmonics they appear if any, and the highest of these."""
 
     def add_family(self, meshes: tuple[int, ...], planets: PlanetSet | None) -> None:
         """Add the deviations of all meshes of a family of planets, or of a single mesh."""
@@ -209,7 +253,7 @@ class _Series:
         for key, turned in self._in_frame(load.body, load.order, wave):
             self._add(self.displacement, (number, key), np.zeros(len(self.waves.waves), dtype=complex))
             self._add(self.reaction, (number, key), turned)
-            self.beside += [(key, base, REACH) for base in range(len(self.waves.base_orders))]
+            self.beside += [(key, None, None), *((key, base, REACH) for base in range(len(self.waves.base_orders)))]
 
     def _in_frame(self, body: str, order: float, wave: Complexes) -> list[tuple[Key, Complexes]]:
         """Multiples of rotations, and generalized forces (size,) in the rotating frame, of a load on a body."""
@@ -259,6 +303,7 @@ class _Series:
             np.array([n for n, _ in self.displacement], dtype=np.int64),
             np.array([self.frame.speeds.get(load.body, 0.0) for load in loads]),
             self.frame.matrices(0.0)[0][self.assembly.varying_loads.turning],
+            np.array([any(load.body in planets.names for planets in self.frame.sets) for load in loads], dtype=bool),
         )
 
     def _wheel(self, mesh: int, end: int) -> tuple[str, int]:

@@ -1,4 +1,4 @@
-"""Signals of a steady-state response: transmission errors, forces, accelerations, surface velocity of the housing.
+"""Signals of a steady-state response: transmission errors, forces, torques, speeds, accelerations, surface velocity.
 
 Bearings of planets have multi-blade components, along radius and tangent, as the planets themselves.
 
@@ -41,12 +41,18 @@ SURFACE_VELOCITY = SignalName("surface_velocity", "surface_velocity", "m/s")
 """Normal velocity of the outer surface of a flexible housing, root mean square over the surface, without a phase."""
 
 
+COUPLING_TORQUE = SignalName("coupling_torque", "coupling_torque", "N m")
+"""Torque of a coupling by its spring and damper, positive where it accelerates the first body about +z."""
+BODY_SPEED = SignalName("body_speed", "body_speed", "rad/s")
+"""Fluctuation of the speed of a body about its mean, about +z; of a flexible body at its main seat."""
+
+
 @dataclass(frozen=True, eq=False)
 class SignalRows:
     """Rows that give signals from the motion u at one speed of the input: (A + i w B - w^2 C) u."""
 
     names: tuple[SignalName, ...]
-    """Of these rows: overall transmission error, bearing forces, seat accelerations."""
+    """Of these rows: overall transmission error, bearing forces, seat accelerations, coupling torques, speeds."""
     by_place: Floats
     by_rate: Floats
     by_acceleration: Floats
@@ -94,7 +100,24 @@ def signal_rows(system: MeanSystem, speed: float) -> SignalRows:
         place += [*(by_q @ t + speed * by_v @ t1), *(speed**2 * seats @ t2)]
         rate += [*(by_v @ t), *(2.0 * speed * seats @ t1)]
         acceleration += [*np.zeros_like(by_q), *(seats @ t)]
+    spins = np.eye(assembly.size)
+    ends = spins[assembly.springs.coordinates]
+    torques = (ends[:, 1] - ends[:, 0]) @ t
+    names += [_part(COUPLING_TORQUE, name) for name in assembly.spring_names]
+    place += [*(assembly.springs.stiffness[:, None] * torques)]
+    rate += [*(assembly.springs.damping[:, None] * torques)]
+    planets = {name for own in frame.sets for name in own.names}
+    turning = {name: at for name, at in assembly.spin.items() if name not in planets and frame.speeds.get(name)}
+    names += [_part(BODY_SPEED, name) for name in turning]
+    place += [np.zeros(assembly.size)] * len(turning)
+    rate += [*(spins[list(turning.values())] @ t)]
+    acceleration += [np.zeros(assembly.size)] * (len(torques) + len(turning))
     return SignalRows(tuple(names), np.array(place), np.array(rate), np.array(acceleration))
+
+
+def _part(signal: SignalName, name: str) -> SignalName:
+    """Name a signal of a part."""
+    return SignalName(f"{signal.name} {name}", signal.quantity, signal.units)
 
 
 def _forces(assembly: Assembly, q: Floats, v: Floats) -> Floats:

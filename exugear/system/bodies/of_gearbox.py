@@ -193,7 +193,8 @@ def _seats(gearbox: Gearbox, body: Body, shape: ShapeSection) -> Iterator[SeatBa
     for force in gearbox.forces:
         if force.body == body.name:
             yield SeatBand(force.name, force.position[2] - start, 0.0)
-    for name, place in {own.excitation: own.position for own in gearbox.varying_loads if own.body == body.name}.items():
+    loads = [own for own in gearbox.varying_loads if body.name in (own.body, own.reaction_on)]
+    for name, place in {own.excitation: own.position for own in loads}.items():
         if place is not None:
             yield SeatBand(name, place[2] - start, 0.0)
     if shape.torque_z_mm is not None:

@@ -66,8 +66,21 @@ def drive_of(model, response):
     return (
         response.torque
         + torque_of_vibration(model.system, own.speed, own.frequencies, response.motion)
-        + (torque_of_errors(model, response))
+        + torque_of_errors(model, response)
+        + torque_of_stated_loads(model, response)
     )
+
+
+def torque_of_stated_loads(model, response):
+    """Mean torque of the drive, N m, by stated loads that turn with the vibration of their bodies.
+
+    A torque over the angle of its body does no work over a revolution: what it gives to the vibration it takes from the
+    rotation. The method `nonlinear` includes it.
+    """
+    own = response.interface
+    if not len(model.shaft_orders.loads.order):
+        return 0.0
+    return model.with_turned_loads(own, response.motion).loads.torque - own.loads.torque
 
 
 def torque_of_errors(model, response):

@@ -20,10 +20,14 @@ from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_response import response_of
 from exugear.system.build import assemble
+from exugear.system.gearbox_checks import gearbox_warnings
+from exugear.system.kernels.coordinates import SPIN
 from exugear.system.loads import LoadTable
 from exugear.system.system import Assembly, input_hash
 
+from ..cases.assembled import assembled
 from ..cases.both_ways import compiled_states, exudyn_states
+from ..cases.box import box_content
 from ..cases.case_mutations import toml_text
 from ..cases.spur import SPUR_CASE
 from ..cases.steady_runs import fitted, solver_of
@@ -149,6 +153,30 @@ def test_a_reaction_acts_on_another_body_at_the_same_place():
     load = {"shaft_1": 100.0, "shaft_2": 150.0}
     ours, exudyns = (states(assembly, q, v, load, 60, 2e-6)[0] for states in (compiled_states, exudyn_states))
     np.testing.assert_allclose(ours - q, exudyns - q, rtol=0.0, atol=1e-6 * np.abs(ours - q).max(axis=0).min())
+
+
+@pytest.mark.parametrize("seat", [None, "stator"])
+def test_a_stator_acts_on_the_seat_of_its_name_on_a_flexible_housing(tmp_path, seat):
+    """Air-gap torque of order 6: both solvers have it on the rotor and, opposed, on the housing; else a warning."""
+    case = box_content(tmp_path)
+    case["excitations"] = {"stator": {"body": "shaft_1", "orders": [6], "torque_N_m": [5.0], "reaction_on": "box"}}
+    if seat is not None:
+        own = {"diameter_mm": 60.0, "inner_diameter_mm": 0.0, "position_mm": [-12.5, 0.0, -12.0]}
+        case["bodies"]["box"]["solid"]["seats"][seat] = own
+    gearbox = Gearbox.from_dict(case, str(tmp_path / "case.toml"))
+    told = [line for line in gearbox_warnings(gearbox) if "[bodies.box.solid.seats.stator]" in line]
+    assert len(told) == (1 if seat is None else 0)
+    assembly = assembled(gearbox, Choice("flexible"), {"spur": 3e8})
+    expected = np.zeros(assembly.size)
+    expected[assembly.spin["shaft_1"]] = 5.0 * np.cos(6 * 0.4)
+    expected[assembly.coordinates["box" if seat is None else "box.stator"][SPIN]] = -5.0 * np.cos(6 * 0.4)
+    np.testing.assert_allclose(applied(assembly, "shaft_1", 0.4, 80.0), expected, rtol=1e-12, atol=1e-12)
+    rng = np.random.default_rng(5)
+    q, v = 1e-7 * rng.normal(size=(2, assembly.size))
+    v[assembly.spin["shaft_1"]] = 80.0
+    load = {"shaft_1": 100.0, "shaft_2": 150.0}
+    ours, exudyns = (states(assembly, q, v, load, 60, 5e-7)[0] for states in (compiled_states, exudyn_states))
+    np.testing.assert_allclose(ours - q, exudyns - q, rtol=0.0, atol=1e-8 * np.abs(ours - q).max(axis=0).min())
 
 
 def test_two_inertias_and_a_coupling_answer_a_torque_between_them_as_in_closed_form():
@@ -307,3 +335,21 @@ def test_the_terminal_names_the_excitation_of_an_order(tmp_path, monkeypatch):
     assert "12 × rotation of shaft_1 (ripple)" in said
     assert "Sources of the transmission error at resonances" in said
     assert "ripple 100 %" in said
+
+
+@pytest.mark.validation
+def test_report_and_view_name_the_excitation_of_a_resonance(tmp_path, monkeypatch):
+    """The page states cause and share, and draws combinations of mesh and excitation; the view has its order."""
+    monkeypatch.chdir(tmp_path)
+    answer(tmp_path)
+    result = CliRunner().invoke(app, ["report", "results", "--stored"])
+    assert result.exit_code == 0, result.output
+    page = (tmp_path / "results" / "report.html").read_text(encoding="utf-8")
+    assert "Excited by the 12th order of the rotation of shaft 1 (excitation ripple)" in page
+    assert "ripple 100 %" in page
+    monkeypatch.setattr("exugear.cli.tasks.view._draw_pictures", lambda *given: [])
+    result = CliRunner().invoke(app, ["view", "gearbox.toml", "--out", "results"])
+    assert result.exit_code == 0, result.output
+    pages = [path.read_text(encoding="utf-8") for path in (tmp_path / "results").rglob("modes.html")]
+    assert pages
+    assert any("(ripple)" in text for text in pages)

@@ -200,6 +200,34 @@ def test_a_peak_that_only_moves_is_lower_here_but_not_in_the_range() -> None:
     assert outside["error"][1] == pytest.approx(8e-6, rel=1e-6)
 
 
+def test_a_peak_of_an_excitation_is_found_by_its_order_of_the_shaft_alone() -> None:
+    """Order 12 of a shaft beside a sideband of the mesh at the same frequency; without the excitation there is none."""
+    data = response([[1e-6, 3e-6], [8e-6, 2e-6], [1e-6, 1e-6]])
+    index = (("line", "base"), np.array([[0, 0], [0, 12], [1, -8]]))
+    data = data.drop_vars(["base", "index"]).assign(index=index, order=("line", [0.0, 12.0, 12.0]))
+    data = data.assign_coords(base=["spur", "rotation of shaft_1"])
+    multiples = multiples_of(data, 12.0, {"spur"})
+    assert multiples == {"rotation of shaft_1": 12}
+    found = peaks_of(data, multiples, {"spur"}, 12.0 * 10.0 / (2.0 * math.pi), (8.0, 12.0))
+    assert found["error"] == pytest.approx((8e-6, 8e-6))
+    without = peaks_of(data.isel(base=[0]), multiples, {"spur"}, 12.0 * 10.0 / (2.0 * math.pi), (8.0, 12.0))
+    assert without["error"][0] == 0.0
+
+
+def test_couplings_are_changed_and_excitations_left_out_where_they_matter() -> None:
+    content = tomllib.loads(SPUR_CASE)
+    content["bodies"]["rotor"] = {"spin_only": True, "inertia": {"disc": {"axial_kg_m2": 0.02}}}
+    content["couplings"] = {"clutch": {"bodies": ["rotor", "shaft_1"], "stiffness_N_m_per_rad": 5e4}}
+    content["excitations"] = {"ripple": {"body": "rotor", "orders": [12], "torque_N_m": [5.0]}}
+    gearbox = Gearbox.from_dict(content)
+    found = {change.name: change for change in propose_changes(gearbox, {}, {}, [], ["clutch"], ["ripple"])}
+    assert found["clutch-stiffer"].keys == {"couplings.clutch.stiffness_N_m_per_rad": 1.3 * 5e4}
+    assert found["clutch-softer"].group == "coupling"
+    assert found["ripple-none"].words == "without the excitation ripple"
+    assert found["ripple-none"].group == "assumption"
+    assert gearbox.varied(found["ripple-none"].keys).varying_loads == ()
+
+
 def test_changes_are_sorted_with_assumptions_and_refusals_behind() -> None:
     change = DesignChange("a", "a", "gear", {})
     worse = ChangeResult(change, {"error": Effect(3.0, 3.0)}, "")

@@ -239,6 +239,37 @@ def test_all_that_acts_on_a_floating_body_acts_as_in_the_other_frame(gearbox: Ge
 
 
 @pytest.mark.validation
+def test_loads_over_the_angle_act_on_a_floating_body_as_in_the_other_frame(gearbox: Gearbox, stiffness: dict) -> None:
+    # A torque with its reaction on the wheel, and an unbalance of 40 N; 0.6 rad of the shaft. What is left is of
+    # second order.
+    excitations = {
+        "ripple": {"body": "shaft", "orders": [9], "torque_N_m": [2.0], "reaction_on": "wheel"},
+        "balance": {"body": "shaft", "z_mm": 150.0, "unbalance_g_mm": 230.0, "phase_deg": [40.0]},
+    }
+    loaded = gearbox.varied({"excitations": excitations})
+    floating = assembled(loaded, Choice("flexible"), stiffness)
+    start = accelerating_start(floating, LOAD, SPEED)
+    ends = {}
+    for name, assembly, varying in (
+        ("floating", floating, floating.varying_loads),
+        ("plain", without_floating_frames(floating), floating.varying_loads),
+        ("unloaded", without_floating_frames(floating), None),
+    ):
+        system = ExudynSystem(assembly, start.q, start.v, LoadTable(LOAD, varying=varying))
+        system.run(0.0, 60, 2.4e-5, explicit=False)
+        ends[name] = system.state()[1]
+    moved = ends["plain"] - ends["unloaded"]
+    place = floating.elastic_slices["shaft"]
+    seats = 6 * len(floating.elastic_bodies["shaft"].reduced.seats)
+    for motions in ((0, 1, 2), (3, 4), (5,)):
+        own = [i for i in range(place.start, place.start + seats) if (i - place.start) % 6 in motions]
+        assert np.abs(moved[own]).max() > 1e-7
+        assert np.abs(ends["floating"] - ends["plain"])[own].max() < 1e-2 * np.abs(moved[own]).max()
+    wheel = floating.spin["wheel"]
+    assert abs(ends["floating"][wheel] - ends["plain"][wheel]) < 1e-2 * abs(moved[wheel])
+
+
+@pytest.mark.validation
 def test_spins_go_on_through_whole_turns(floating: Assembly) -> None:
     found, _ = trajectories(floating, 160, 1e-4)  # 16 ms at 420 rad/s: once around
     turned = found[:, floating.spin["shaft"]]

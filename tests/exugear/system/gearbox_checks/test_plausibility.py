@@ -239,3 +239,55 @@ def test_a_wheel_narrower_than_the_shaft_that_is_drawn_under_it_is_told():
         content = tomllib.loads((ROOT / "cases/grc750/gearbox.toml").read_text("utf-8"))
         content["gears"][name]["held_diameter_mm"] *= 0.5
         assert not [*part_warnings(Gearbox.from_dict(content, str(ROOT / "cases/grc750/gearbox.toml")))]
+
+
+@pytest.mark.parametrize(
+    ("excitation", "told"),
+    [
+        ({"orders": [48], "torque_percent": [0.5]}, ""),
+        (
+            {"orders": [1], "torque_percent": [0.5]},
+            "excitations.ripple: its order 1 turns the gear train by 0.41 mesh cycles at 300 rpm of input; low orders "
+            "are far too high without the inertias of the connected machines",
+        ),
+        (
+            {"orders": [96], "torque_N_m": [150.0]},
+            "excitations.ripple: amplitude of 150 N m on input at 3000 rpm, above the static torque of 100 N m, so "
+            "that teeth lose contact; check the unit",
+        ),
+        ({"z_mm": -28.9, "unbalance_g_mm": 35.0}, ""),
+        (
+            {"z_mm": -28.9, "unbalance_g_mm": 6.3},
+            "excitations.ripple.unbalance_g_mm = 6.3: looks like a balance quality grade; G 6.3 of 1.74 kg at 3000 rpm "
+            "permits 34.9 g mm",
+        ),
+        (
+            {"z_mm": -28.9, "unbalance_g_mm": 3500.0},
+            "excitations.ripple.unbalance_g_mm = 3500: balance quality grade G 632 of 1.74 kg at 3000 rpm "
+            "(ISO 21940-11); check the unit",
+        ),
+    ],
+)
+def test_stated_loads_are_compared_with_static_torque_inertia_and_balance_grades(excitation, told):
+    """Without machines, the inertia at the input is 3e-3 kg m2; U = 9549 G m / n by ISO 21940-11."""
+    content = template("parallel") | {"excitations": {"ripple": {"body": "input"} | excitation}}
+    found = [line for line in gearbox_warnings(Gearbox.from_dict(content)) if "excitations" in line]
+    assert len(found) == (1 if told else 0)
+    assert all(line.startswith(told) for line in found)
+
+
+def test_the_inertia_of_the_machine_silences_the_warning_about_low_orders():
+    content = template("parallel") | {"excitations": {"ripple": {"body": "rotor", "orders": [6], "torque_N_m": [2.0]}}}
+    content["bodies"]["rotor"] = {"spin_only": True, "inertia": {"discs": {"axial_kg_m2": 0.2}}}
+    content["couplings"] = {"shaft": {"bodies": ["rotor", "input"], "stiffness_N_m_per_rad": 2e4}}
+    assert not any("excitations" in line for line in gearbox_warnings(Gearbox.from_dict(content)))
+    content["bodies"]["rotor"]["inertia"]["discs"]["axial_kg_m2"] = 1e-4
+    assert any("connected machines" in line for line in gearbox_warnings(Gearbox.from_dict(content)))
+
+
+def test_a_table_that_does_not_cover_the_operating_speeds_is_told(tmp_path: Path):
+    (tmp_path / "ripple.csv").write_text("speed_rpm,order,amplitude_N_m\n0,96,0.5\n2000,96,0.5\n", encoding="utf-8")
+    content = template("parallel") | {"excitations": {"ripple": {"body": "input", "table": "ripple.csv"}}}
+    found = gearbox_warnings(Gearbox.from_dict(content, str(tmp_path / "gearbox.toml")))
+    told = "excitations.ripple.table: covers 0 to 2000 rpm of input, which turns at 300 to 3000 rpm"
+    assert [line for line in found if line.startswith(told)]

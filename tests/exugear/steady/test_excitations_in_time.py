@@ -1,0 +1,185 @@
+"""Responses to stated loads against runs in time that start on them: by all methods, on and off resonances."""
+
+from __future__ import annotations
+
+import tomllib
+from typing import Any
+
+import numpy as np
+import pytest
+
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.templates.kinds import template
+from exugear.steady.balance.response import signals
+from exugear.steady.point_solver import PointSolver
+from exugear.system.build import assemble
+from exugear.system.modal_damping import with_damping_times
+from exugear.system.system import Assembly
+
+from ..cases import table as table_case
+from ..cases.assembled import assembled
+from ..cases.bearing import BEARING_CASE, NON_LINEAR
+from ..cases.spur import SPUR_CASE
+from ..cases.steady_runs import fitted, solver_of
+
+CYCLE = 2.0 * np.pi * np.arange(50) / 50
+SHAPE = 1.0 + 0.05 * np.cos(CYCLE + 0.3) + 0.02 * np.cos(2 * CYCLE + 1.1) + 0.01 * np.cos(3 * CYCLE)
+MEANS = {"stage_1": 3e8, "stage_2": 6e8}
+RIPPLE = {"body": "input", "orders": [12], "torque_N_m": [5.0]}
+"""A twentieth of the static torque; it meets modes of the `parallel` template at 204.8 and 225.1 rad/s."""
+MACHINE = {"body": "rotor", "orders": [6, 12], "pole_pairs": 4, "torque_percent": [2.0, 0.5]}
+
+
+def parallel(ripple: dict[str, Any], law: str = "line_of_action") -> Assembly:
+    """Template `parallel` on bearings, with an electric machine where the ripple is that of one."""
+    case = tomllib.loads(template("parallel")) | {"excitations": {"ripple": ripple}}
+    if ripple["body"] == "rotor":
+        case["bodies"]["rotor"] = {"spin_only": True, "inertia": {"discs": {"axial_kg_m2": 0.02}}}
+        case["couplings"] = {"shaft": {"bodies": ["rotor", "input"], "stiffness_N_m_per_rad": 2e4}}
+        case["static_load"]["torques_N_m"] = {"rotor": 100.0}
+    gearbox = with_damping_times(Gearbox.from_dict(case))
+    if law == "table":
+        surfaces = {name: table_case.surface_of(gearbox, name, stiffness=mean) for name, mean in MEANS.items()}
+        return assemble(gearbox, Choice("bushing", "table"), surfaces)
+    return assemble(gearbox, Choice("bushing"), {name: mean * SHAPE for name, mean in MEANS.items()})
+
+
+def differences(
+    assembly: Assembly, solver: PointSolver, speed: float, order: float, duration: float, step: float
+) -> tuple[float, float, float]:
+    """Differences of an order over itself, and of all lines and their amplitudes over all lines, from a run in time."""
+    response = solver.response(speed)
+    found = solver if solver.state is None else solver.state
+    measured, lines = fitted(
+        found, response if solver.state is None else solver.state.response, duration, step, 0.5 * duration, assembly
+    )
+    model, response = found.model, solver.response(measured)
+    if solver.state is not None:
+        again = solver.state.on(model)
+        response = again.response
+    known = 2.0 * signals(model, response)[1:, 0]
+    line = int(np.argmin(np.abs(model.lines.orders[1:] - order)))
+    size = float(np.linalg.norm(known))
+    own = float(abs(lines[line] - known[line]) / abs(known[line]))
+    return own, float(np.linalg.norm(lines - known)) / size, float(np.linalg.norm(abs(lines) - abs(known))) / size
+
+
+@pytest.mark.parametrize("speed", [150.0, 204.8, -225.1])
+@pytest.mark.parametrize("method", ["parametric", "nonlinear"])
+def test_a_ripple_on_two_stages_stays_on_its_steady_state_on_and_off_resonances(method, speed):
+    """RK4 at 1/80 kHz. On the resonance at 225.1 rad/s the order has 85 um, 25 times as much as off it."""
+    assembly = parallel(RIPPLE)
+    solver = solver_of(assembly, sorted((0.5 * speed, 1.4 * speed)), method, 8)
+    own, every, _ = differences(assembly, solver, speed, 12.0, 0.6, 1.0 / 80e3)
+    assert own < 5e-4
+    assert every < 1e-3
+
+
+@pytest.mark.validation
+@pytest.mark.parametrize("speed", [150.0, 204.8])
+def test_a_ripple_on_two_stages_with_tables_stays_on_its_steady_state(speed):
+    """Method `nonlinear`, law `table`: RK4 at 1/120 kHz."""
+    assembly = parallel(RIPPLE, "table")
+    solver = solver_of(assembly, (100.0, 300.0), "nonlinear", 8)
+    own, every, _ = differences(assembly, solver, speed, 12.0, 0.6, 1.0 / 120e3)
+    assert own < 1e-4
+    assert every < 2e-4
+
+
+@pytest.mark.parametrize("speed", [58.18, 90.0])
+@pytest.mark.parametrize("method", ["parametric", "nonlinear"])
+def test_an_electric_drive_stays_on_its_steady_state(method, speed):
+    """Orders 24 and 48 of a rotor on a coupling; its order 48 meets a mode at 58.18 rad/s."""
+    assembly = parallel(MACHINE)
+    solver = solver_of(assembly, (50.0, 150.0), method, 8)
+    own, every, _ = differences(assembly, solver, speed, 24.0, 0.6, 1.0 / 80e3)
+    assert own < 1e-3
+    assert every < 1e-3
+
+
+@pytest.mark.validation
+@pytest.mark.parametrize(("speed", "duration", "step"), [(8.0, 0.6, 1.0 / 60e3), (4.259, 1.2, 1.0 / 40e3)])
+def test_the_ripple_of_a_generator_stays_on_its_steady_state(grc, stiffness, speed, duration, step):
+    """Order 12 of the high-speed shaft of the GRC, off and on a resonance (0.4 and 55 um)."""
+    ripple = {"body": "hss", "orders": [12], "torque_N_m": [100.0]}
+    assembly = assemble(grc.varied({"excitations": {"ripple": ripple}}), Choice("bushing"), stiffness)
+    solver = solver_of(assembly, (0.6 * speed, 1.5 * speed), "parametric", 8)
+    order = 12.0 * abs(solver.model.system.frame.speeds["hss"])
+    own, every, _ = differences(assembly, solver, speed, order, duration, step)
+    assert own < 1e-3
+    assert every < 1e-3
+
+
+@pytest.mark.validation
+def test_the_ripple_of_a_generator_on_flexible_shafts_stays_on_its_steady_state(grc_shafts, stiffness):
+    """144 coordinates; at 4 rad/s order 12 of the high-speed shaft is at a peak of 48 um."""
+    ripple = {"body": "hss", "orders": [12], "torque_N_m": [100.0]}
+    assembly = assembled(grc_shafts.varied({"excitations": {"ripple": ripple}}), Choice("flexible"), stiffness)
+    solver = solver_of(assembly, (2.4, 6.0), "parametric", 8)
+    order = 12.0 * abs(solver.model.system.frame.speeds["hss"])
+    own, every, _ = differences(assembly, solver, 4.0, order, 0.4, 1.0 / 100e3)
+    assert own < 1e-3
+    assert every < 1e-3
+
+
+def pair(ripple: dict[str, Any], torque: float = 100.0, variation: float = 1.0) -> tuple[Assembly, PointSolver]:
+    """Pair with a table and a torque over the angle of a shaft, and its solver by the method `nonlinear`."""
+    case = tomllib.loads(SPUR_CASE) | {"excitations": {"ripple": {"body": "shaft_1"} | ripple}}
+    case["static_load"]["torques_N_m"]["shaft_1"] = torque
+    case["damping"] = {"mesh_time_s": 4e-6, "bearing_time_s": 4e-6}
+    for gear in case["gears"].values():
+        gear["tooth_thinning_mm"] = 0.03
+    gearbox = Gearbox.from_dict(case)
+    surface = table_case.surface_of(gearbox, "spur", variation=variation, stiffness=3e8)
+    assembly = assemble(gearbox, Choice("bushing", "table"), {"spur": surface})
+    return assembly, solver_of(assembly, (50.0, 2000.0), "nonlinear")
+
+
+@pytest.mark.parametrize(
+    ("ripple", "speed", "order"),
+    [
+        ({"orders": [12, 17], "torque_N_m": [5.0, 3.0]}, 150.0, 5.0),
+        ({"orders": [12], "torque_N_m": [150.0]}, 150.0, 24.0),
+        ({"orders": [20], "torque_N_m": [20.0]}, 150.0, 40.0),
+        ({"body": "shaft_2", "orders": [6, 9], "torque_N_m": [5.0, 3.0]}, -150.0, 4.0),
+    ],
+)
+def test_torques_turn_with_the_vibration_of_their_body_in_the_nonlinear_method(ripple, speed, order):
+    """The angle that a torque adds to its body makes sums, differences and multiples of its orders.
+
+    12 and 17 per revolution make 5; 150 N m at order 12, above the static torque, make 24; order 20 is that of the
+    mesh; orders 6 and 9 of shaft 2 are 4 and 6 of shaft 1, which is 1.5 times as fast.
+    """
+    assembly, solver = pair(ripple)
+    own, every, amplitudes = differences(assembly, solver, speed, order, 0.6, 1.0 / 240e3)
+    assert own < 1e-3
+    assert every < 3e-4
+    assert amplitudes < 1e-4
+
+
+def test_teeth_that_part_under_a_ripple_stay_on_their_steady_state():
+    """A quarter of the time without contact, in the resonance of the mesh; the ripple is a fifth of the torque."""
+    assembly, solver = pair({"orders": [12], "torque_N_m": [20.0]}, variation=3.0)
+    resonance = float(solver.model.system.eigenvalues(100.0).imag.max()) / 20.0
+    for share in np.arange(1.16, 0.97, -0.04):
+        solver.response(share * resonance)
+    own, every, amplitudes = differences(assembly, solver, 0.96 * resonance, 12.0, 0.1, 1.0 / 1e6)
+    assert solver.state is not None
+    assert solver.state.response.apart[0] > 0.2
+    assert own < 1e-3
+    assert every < 2e-3
+    assert amplitudes < 1e-3
+
+
+def test_a_torque_moves_rolling_bearings_evaluated_in_time_as_in_a_run():
+    """Method `nonlinear`: balls and rollers without clearance; order 7 is beside all orders of the mesh."""
+    content = tomllib.loads(BEARING_CASE) | {
+        "excitations": {"ripple": {"body": "shaft_1", "orders": [7], "torque_N_m": [5.0]}}
+    }
+    gearbox = Gearbox.from_dict(content).varied(NON_LINEAR)
+    assembly = assemble(gearbox, Choice("bushing"), {"spur": 3e8 * SHAPE})
+    solver = solver_of(assembly, (50.0, 200.0), "nonlinear")
+    own, every, _ = differences(assembly, solver, 100.0, 7.0, 0.3, 1.0 / 120e3)
+    assert own < 1e-3
+    assert every < 1e-3

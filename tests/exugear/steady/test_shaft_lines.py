@@ -1,0 +1,168 @@
+"""Trains of shafts and couplings without gears: published and closed forced responses, signals, refusals."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from exugear.cli.app import app
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.steady.balance.response import signals
+from exugear.steady.mean_system.planet_sets import SteadyError
+from exugear.steady.point_solver import PointSolver
+from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.steady.steady_file import to_dataset, with_names
+from exugear.steady.steady_response import response_of
+from exugear.studies.quantities import QUANTITIES, outputs_of
+from exugear.system.build import assemble
+
+from ..cases.case_mutations import toml_text
+from ..cases.steady_runs import fitted, solver_of
+
+SPEEDS = (2.0, 60.0)
+
+
+def shaft_line(
+    inertias: dict[str, float], couplings: dict[str, tuple[str, str, float, float]], **excitation: Any
+) -> dict[str, Any]:
+    """Discs (kg m2) on couplings: bodies, stiffness (N m/rad) and damping (N m s/rad); the last disc is locked."""
+    names = list(inertias)
+    return {
+        "name": "shaft line",
+        "default_inertias": "disc",
+        "overall": {"input": names[0], "output": names[-1]},
+        "static_load": {"torques_N_m": {names[0]: 500.0}, "locked": [names[-1]]},
+        "bodies": {
+            name: {"spin_only": True, "inertia": {"disc": {"axial_kg_m2": inertia}}}
+            for name, inertia in inertias.items()
+        },
+        "couplings": {
+            name: {"bodies": [one, other], "stiffness_N_m_per_rad": stiffness, "damping_N_m_s_per_rad": damping}
+            for name, (one, other, stiffness, damping) in couplings.items()
+        },
+        "excitations": {"torque": excitation},
+        "load_cases": {"run": {"torques_N_m": {names[0]: 500.0, names[-1]: -500.0}, "duration_s": 0.5}},
+    }
+
+
+def solver(content: dict[str, Any], method: str = "parametric") -> PointSolver:
+    return solver_of(assemble(Gearbox.from_dict(content), Choice("rigid"), {}), SPEEDS, method)
+
+
+def amplitudes(own: PointSolver, speed: float, order: float) -> dict[str, complex]:
+    """Complex peak amplitudes of all signals at an order."""
+    line = int(np.argmin(np.abs(own.model.lines.orders - order)))
+    found = 2.0 * signals(own.model, own.response(speed))[line]
+    return dict(zip((name.name for name in own.model.signal_names), found.tolist(), strict=True))
+
+
+def absorber(order: int = 4) -> dict[str, Any]:
+    """Main disc on a spring against a flywheel that hardly vibrates, and a tuned absorber of a fifth of its inertia."""
+    return shaft_line(
+        {"flywheel": 1e10, "main": 1.0, "absorber": 0.2},
+        {"spring": ("flywheel", "main", 1e4, 0.0), "tuned": ("main", "absorber", 2e3, 0.0)},
+        body="main",
+        orders=[order],
+        torque_N_m=[30.0],
+    )
+
+
+def test_a_tuned_absorber_responds_as_den_hartog_prints():
+    """J. P. Den Hartog, Mechanical Vibrations, 4th ed. (1956), section 3.2, undamped absorber with k / K = 1 / 5.
+
+    x_1 / x_st = (1 - g^2) / ((1 - g^2) (1 + 1/5 - g^2) - 1/5) and x_2 / x_st = 1 / (the same) with g = w / w_a. At
+    g = 1 the main mass stands still, and the absorber moves by -T / k. Resonances are printed at 0.80 and 1.25.
+    """
+    content = absorber()
+    content["static_load"]["torques_N_m"] = {"flywheel": 1e-9}  # no twist that changes phases
+    own = solver(content)
+    static = 30.0 / 1e4
+    for g in (0.5, 0.75, 0.9, 1.0, 1.1, 1.4, 2.0):
+        w = 100.0 * g
+        found = amplitudes(own, w / 4.0, 4.0)
+        below = (1.0 - g**2) * (1.2 - g**2) - 0.2
+        assert found["body_speed main"] == pytest.approx(1j * w * static * (1.0 - g**2) / below, rel=1e-6, abs=1e-6)
+        assert found["body_speed absorber"] == pytest.approx(1j * w * static / below, rel=1e-6)
+        assert found["coupling_torque tuned"] == pytest.approx(2e3 * static * g**2 / below, rel=1e-6)
+    frequencies = np.sort(own.model.system.eigenvalues(25.0).imag)[-2:] / 100.0
+    assert frequencies == pytest.approx([0.80, 1.25], abs=5e-3)
+    assert frequencies == pytest.approx(np.sqrt(1.1 + np.array([-1.0, 1.0]) * np.sqrt(0.21)), rel=1e-6)
+
+
+def ship(**excitation: Any) -> dict[str, Any]:
+    """Engine, shaft and propeller: the third order of the engine meets 40.6 rad/s, at 129 rpm."""
+    torque = {"body": "engine", "orders": [3], "torque_N_m": [100.0]} | excitation
+    return shaft_line({"engine": 50.0, "propeller": 80.0}, {"shaft": ("engine", "propeller", 5e4, 40.0)}, **torque)
+
+
+@pytest.mark.parametrize("method", ["linear", "parametric"])
+def test_an_engine_twists_its_shaft_as_in_closed_form(method):
+    """Twist = T / J_1 / (w_0^2 - w^2 + i w c / J) with 1 / J = 1 / 50 + 1 / 80; the shaft drives the propeller."""
+    own = solver(ship(), method)
+    inertia = 1.0 / (1.0 / 50.0 + 1.0 / 80.0)
+    for speed in (5.0, 13.5, 40.0):
+        w = 3.0 * speed
+        twist = 100.0 / 50.0 / (5e4 / inertia - w**2 + 1j * w * 40.0 / inertia)
+        torque = (5e4 + 1j * w * 40.0) * twist
+        found = amplitudes(own, speed, 3.0)
+        assert found["coupling_torque shaft"] == pytest.approx(-torque, rel=1e-9)
+        assert found["body_speed propeller"] == pytest.approx(torque / (1j * w * 80.0), rel=1e-9)
+
+
+def test_a_run_of_a_shaft_line_started_on_its_steady_state_stays_there():
+    """RK4 at 1/20 kHz, on the resonance; a run takes the torque at the angle that the vibration turns, 1e-3 rad."""
+    content = ship(torque_N_m=[10.0])
+    assembly = assemble(Gearbox.from_dict(content), Choice("rigid"), {})
+    own = solver_of(assembly, SPEEDS, "parametric")
+    speed, lines = fitted(own, own.response(13.5), 8.0, 1.0 / 20e3, 4.0, assembly)
+    known = 2.0 * signals(own.model, own.response(speed))[1:, 0]
+    assert np.linalg.norm(lines - known) < 1e-3 * np.linalg.norm(known)
+
+
+def test_studies_have_torques_of_couplings_and_fluctuations_of_speeds_by_their_names():
+    """Largest over six speeds of the third order, with units; a tenth of the torque of the engine."""
+    assembly = assemble(Gearbox.from_dict(ship(torque_N_m=[10.0])), Choice("rigid"), {})
+    response = response_of(assembly, SteadySettings(SpeedRange(5.0, 10.0, 6), "linear", at_resonances=False))
+    results: Any = SimpleNamespace(steady=with_names(to_dataset(response)))
+    options = {"quantity": "largest_line", "line": "3 x rotation of engine"}
+    sections = {"torque": {"signal": "coupling_torque shaft"}, "speed": {"signal": "body_speed propeller"}}
+    outputs = outputs_of({name: options | own for name, own in sections.items()}, QUANTITIES)
+    inertia = 1.0 / (1.0 / 50.0 + 1.0 / 80.0)
+    w = 3.0 * np.linspace(5.0, 10.0, 6)
+    torque = abs((5e4 + 1j * w * 40.0) * 10.0 / 50.0 / (5e4 / inertia - w**2 + 1j * w * 40.0 / inertia))
+    assert outputs["torque"].units == "N m"
+    assert outputs["torque"].of(results) == pytest.approx(torque.max(), rel=1e-6)
+    assert outputs["speed"].units == "rad/s"
+    assert outputs["speed"].of(results) == pytest.approx((torque / (w * 80.0)).max(), rel=1e-6)
+
+
+def test_a_shaft_line_has_a_ranking_and_a_report_and_refuses_what_needs_meshes(tmp_path: Path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "ship.toml").write_text(toml_text(ship()), encoding="utf-8")
+    options = ["ship.toml", "--speeds", "60:240", "--points", "30", "--variant", "rigid", "--json"]
+    result = CliRunner().invoke(app, ["steady", *options])
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.stdout)
+    first = found["resonances"][0]
+    assert first["line"] == "3 x rotation of engine"
+    assert first["speed_rpm"] == pytest.approx(40.6 / 3.0 * 30.0 / np.pi, rel=0.01)
+    assert found["sources_of_overall_dte"][0]["meshes"] == pytest.approx({"torque": 1.0}, abs=1e-6)
+    refused = CliRunner().invoke(app, ["steady", *options, "--method", "nonlinear"])
+    assert refused.exit_code == 2
+    assert "meshes: the train has none" in " ".join(refused.output.split())
+    assert CliRunner().invoke(app, ["report", "ship.toml", "--stored"]).exit_code == 0
+
+
+def test_a_shaft_line_without_excitation_has_no_steady_response():
+    content = ship()
+    del content["excitations"]
+    assembly = assemble(Gearbox.from_dict(content), Choice("rigid"), {})
+    with pytest.raises(SteadyError, match=r"no meshes and no \[excitations\]; add an excitation, or use exugear run"):
+        response_of(assembly, SteadySettings(SpeedRange(5.0, 25.0, 4), "linear"))
