@@ -38,6 +38,7 @@ extensions = [
     "interface_pages",
     "key_pages",
     "outside_pages",
+    "python_names",
     "room_pages",
 ]
 templates_path = ["_templates"]
