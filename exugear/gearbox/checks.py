@@ -112,7 +112,9 @@ def errors_of_inertia_sets(case: GearboxFile, inertia_sets: Sequence[str]) -> It
     if not inertia_sets:
         yield "bodies: all bodies are fixed; a gearbox needs at least one body without fixed = true"
     elif case.default_inertias not in inertia_sets:
-        yield f"default_inertias = {case.default_inertias!r}: no such set; sets are {', '.join(inertia_sets)}"
+        stated = "default_inertias" in case.model_fields_set
+        what = f"default_inertias = {case.default_inertias!r}: no such set" if stated else "default_inertias: missing"
+        yield f"{what}; sets are {', '.join(inertia_sets)}"
 
 
 def errors_of_size(named_bodies: Mapping[str, Body], elements: Mapping[str, Sequence[Element]]) -> Iterator[str]:

@@ -174,8 +174,7 @@ def parse_case(content: dict[str, Any], source: str) -> GearboxFile:
     Traceback (most recent call last):
     ...
     exugear.gearbox.reading.GearboxFileError: x.toml: name = 3: must be text in quotes
-    x.toml: default_inertias: this key is missing; for example default_inertias = "assemblies"
-    ...
+    x.toml: overall: this key is missing; for example overall = { input = "carrier", output = "hss", ...
     """
     try:
         return GearboxFile.model_validate(content)

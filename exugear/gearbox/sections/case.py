@@ -305,8 +305,11 @@ class GearboxFile(Section):
 
     name: Annotated[Text, Field(max_length=200)]
     """Title of the gearbox, for pages and pictures."""
-    default_inertias: Name
-    """Inertia set that commands use by default; one of the sets of the bodies."""
+    default_inertias: Name = "shapes"
+    """Inertia set that commands use by default; one of the sets of the bodies.
+
+    Not needed where the inertia of every body follows from its shape.
+    """
     overall: OverallSection
     """Input and output of the overall transmission error."""
     static_load: StaticLoadSection

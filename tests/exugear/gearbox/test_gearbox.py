@@ -193,7 +193,7 @@ def test_a_line_that_is_not_toml_is_quoted_with_its_remedy(tmp_path: Path, line:
     ("key", "example"),
     [
         (["static_load"], 'static_load = { torques_N_m = { carrier = 240000.0 }, locked = ["hss"] }'),
-        (["default_inertias"], 'default_inertias = "assemblies"'),
+        (["name"], 'name = "GRC 750 kW"'),
         (["overall", "output"], 'output = "hss"'),
         (["gears", "sun", "teeth"], "teeth = 21"),
     ],

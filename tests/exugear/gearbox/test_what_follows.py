@@ -113,6 +113,15 @@ def test_inertia_that_is_given_stays_and_names_the_sets_of_all() -> None:
     assert gearbox.body("one", "other").mass == gearbox.body("one", "usual").mass == gearbox_of().body("one").mass
 
 
+def test_bodies_with_shapes_need_no_name_of_an_inertia_set_and_others_do() -> None:
+    without = ('default_inertias = "usual"\n', "")
+    assert gearbox_of(without).inertia_sets == ("shapes",)
+    assert gearbox_of(without).body("one").mass == gearbox_of().body("one").mass
+    given = "{ mass_kg = 2.0, axial_kg_m2 = 3e-2, transverse_kg_m2 = 3e-2, centre_of_mass_z_mm = 0.0 }"
+    with pytest.raises(GearboxFileError, match="default_inertias: missing; sets are usual$"):
+        gearbox_of(without, ("[bodies.two.shape]", f"inertia.usual = {given}\n[bodies.two.shape]"))
+
+
 def test_a_body_without_inertia_shape_or_gears_to_take_it_from_is_refused() -> None:
     with pytest.raises(
         GearboxFileError, match="requires an inertia table, .* or a shape from which its inertia is computed"
