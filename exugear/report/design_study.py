@@ -7,9 +7,9 @@ the results, so that a stopped study resumes, and a repeated one reads its resul
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import TYPE_CHECKING, NamedTuple, Protocol, Self
 
 import numpy as np
 
@@ -30,8 +30,16 @@ from exugear.report.findings.design_changes import (
     settings_of_study,
     write_design_study,
 )
-from exugear.report.findings.margins import Margin, failing, margins_in_words, margins_of, shortfalls_of
-from exugear.report.findings.proposals import ASSUMPTION, DesignChange, propose_changes
+from exugear.report.findings.margins import (
+    Margin,
+    failing,
+    families_short_of_pitting,
+    margins_in_words,
+    margins_of,
+    raised_in_words,
+    shortfalls_of,
+)
+from exugear.report.findings.proposals import ASSUMPTION, DesignChange, alignment_change, propose_changes
 from exugear.report.findings.ranking import Resonance, ranking_of
 from exugear.report.findings.words import QUANTITIES, excitations_at
 from exugear.results.folder import DESIGN_CHANGES_FILE, bodies_folder
@@ -39,7 +47,7 @@ from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.settings import SteadySettings
 from exugear.system.bearings.rolling.rows import BearingError
 from exugear.system.gearbox_checks import check_parts, lacking
-from exugear.system.statics import BalanceError
+from exugear.system.statics import BalanceError, static_state
 from exugear.system.tooth_mesh.placement import MeshError
 from fe_ste.geometry.checks import GeometryError
 from fe_ste.tools.files import write_file
@@ -60,10 +68,18 @@ STATIC = "static load"
 MOST_LOAD = 3.0
 """Largest load over the static load."""
 NOT_RATED = "its life cannot be computed (`exugear life`)"
-Rated = tuple[dict[str, Margin], list[str]]
-"""Margins of a gearbox, and the parts that fall short of a requirement, as sentences."""
 _REFUSALS = (GearboxFileError, GeometryError, BearingError, BalanceError, MeshError, SteadyError)
 """Errors that say that a change cannot be made."""
+
+
+class Rated(NamedTuple):
+    """What a rating says of a gearbox."""
+
+    margins: dict[str, Margin]
+    shortfalls: list[str]
+    """Parts that fall short of a requirement, as sentences."""
+    short_of_pitting: frozenset[str] = frozenset()
+    """Families of meshes that fall short of the safety against pitting."""
 
 
 class ComputedProject(Protocol):
@@ -151,6 +167,8 @@ def study_design_changes(
     rated = _margins(_project_with(project, project.gearbox, "unchanged"))
     labels = {name: label.column for name, label in QUANTITIES.items()}
     changes = _proposed(project, exciting, chosen)
+    if rated is not None and rated.short_of_pitting:
+        changes += _alignments(project, rated.short_of_pitting)
     results = []
     for number, change in enumerate(changes):
         if progress is not None:
@@ -164,13 +182,18 @@ def study_design_changes(
             effects = least_favourable([effects_of(before[load], after[load]) for load in points])
             costs = [price_of(project.gearbox, gearbox, nominal=rated is None)]
             objection = objection_to(effects, ranking.quantity, labels)
+            remedy = ""
             # The rating takes as long as the response: only a change that is worth it is rated.
-            if not objection and rated is not None and change.group != ASSUMPTION:
+            worth = not objection and change.group != ASSUMPTION
+            if rated is not None and (worth or change.requirement):
                 changed = _margins(_project_with(project, gearbox, change.name))
-                costs.append("" if changed is None else margins_in_words(rated[0], changed[0]))
+                if changed is not None:
+                    costs.append(margins_in_words(rated.margins, changed.margins))
+                    remedy = raised_in_words(rated.margins, changed.margins, change.requirement)
                 failed = [NOT_RATED] if changed is None else _failures(rated, changed)
-                objection = f"fails a requirement: {failed[0]}" if failed else ""
-            results.append(ChangeResult(change, effects, "; ".join(filter(None, costs)), objection))
+                objection = objection or (f"fails a requirement: {failed[0]}" if failed else "")
+            price = "; ".join(filter(None, costs))
+            results.append(ChangeResult(change, effects, price, objection, remedy=remedy))
         except _REFUSALS as error:
             reason = str(error).removeprefix(f"{project.gearbox.source}: ").split("\n")[0]
             results.append(ChangeResult(change, {}, refusal=reason))
@@ -211,6 +234,22 @@ def _proposed(project: ComputedProject, exciting: dict[str, int], resonance: Res
     bearings = [name for name in strained if name not in couplings]
     acting = excitations_at(project.gearbox, resonance.order)
     return propose_changes(project.gearbox, exciting, deflections, bearings, couplings, acting)
+
+
+def _alignments(project: ComputedProject, families: Collection[str]) -> list[DesignChange]:
+    """Helix slopes for the mean gap of each family of meshes under the static load."""
+    state = static_state(project.assembly())
+    meshes = [element.mesh for element in state.assembly.elements]
+    openings = state.misalignment * np.array([mesh.pair.face_width for mesh in meshes])
+    found = (
+        alignment_change(
+            project.gearbox,
+            family,
+            float(np.mean([own for own, mesh in zip(openings, meshes, strict=True) if mesh.family == family])),
+        )
+        for family in sorted(families)
+    )
+    return [change for change in found if change is not None]
 
 
 def _changed_gearbox(project: ComputedProject, change: DesignChange) -> Gearbox:
@@ -276,7 +315,7 @@ def _project_with(project: ComputedProject, gearbox: Gearbox, name: str) -> Comp
 def _requirements(gearbox: Gearbox, rated: Rated | None) -> list[str]:
     """Return what the unchanged gearbox falls short of, or that this is not known although the file has a rating."""
     if rated is not None:
-        return rated[1]
+        return rated.shortfalls
     if gearbox.case.loads is None or gearbox.case.rating is None:
         return []
     return [f"no requirement is checked: {NOT_RATED}"]
@@ -284,8 +323,9 @@ def _requirements(gearbox: Gearbox, rated: Rated | None) -> list[str]:
 
 def _failures(before: Rated, after: Rated) -> list[str]:
     """Return the requirements that a change fails and the unchanged gearbox does not, or not by as much."""
-    known = {line.split(" = ")[0] for line in before[1]}
-    return [*(line for line in after[1] if line.split(" = ")[0] not in known), *failing(before[0], after[0])]
+    known = {line.split(" = ")[0] for line in before.shortfalls}
+    new = [line for line in after.shortfalls if line.split(" = ")[0] not in known]
+    return [*new, *failing(before.margins, after.margins)]
 
 
 def _margins(project: ComputedProject) -> Rated | None:
@@ -297,4 +337,4 @@ def _margins(project: ComputedProject) -> Rated | None:
         data = project.life()
     except _REFUSALS:
         return None
-    return margins_of(data, case.rating), shortfalls_of(data)
+    return Rated(margins_of(data, case.rating), shortfalls_of(data), families_short_of_pitting(data, case.rating))

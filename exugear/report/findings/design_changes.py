@@ -70,6 +70,8 @@ class ChangeResult:
     """Why the change is not recommended; empty if it is."""
     refusal: str = ""
     """Reason why the change cannot be made."""
+    remedy: str = ""
+    """How it raises the margin of the rating that it is to raise; empty if it does not."""
 
     @property
     def recommended(self) -> bool:
@@ -183,7 +185,7 @@ def _result_from(content: Mapping[str, Any]) -> ChangeResult:
     change = DesignChange(**content["change"])
     if change.group not in GROUPS:
         raise ValueError(f"no group {change.group!r}")
-    texts = (str(content[key]) for key in ("price", "objection", "refusal"))
+    texts = (str(content.get(key, "")) for key in ("price", "objection", "refusal", "remedy"))
     return ChangeResult(change, effects, *texts)
 
 

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 TIP_EDGE = "load on tip edges"
 """Name of the largest fraction of load outside the path of contact."""
+PITTING = "S_H"
+CONTACT_SAFETIES = ("contact_safety", "contact_static")
 SAME = 0.005
 """Relative change of a margin up to which it counts as unchanged."""
 
@@ -50,7 +52,7 @@ def margins_of(data: xr.Dataset, rating: RatingSection) -> dict[str, Margin]:
     """
     hours = float(data["hours"].sum())
     found = {
-        "S_H": _smallest(data, "flank", ("contact_safety", "contact_static"), rating.minimum_S_H),
+        PITTING: _smallest(data, "flank", CONTACT_SAFETIES, rating.minimum_S_H),
         "S_F": _smallest(data, "flank", ("root_safety", "root_static"), rating.minimum_S_F),
         "shortest bearing life": _smallest(
             data, "bearing", ("basic_hours", "reference_hours", "modified_hours"), hours, "h"
@@ -70,6 +72,13 @@ def _smallest(data: xr.Dataset, kind: str, names: tuple[str, ...], required: flo
         return None
     _, part = np.unravel_index(int(np.nanargmin(values)), values.shape)
     return Margin(float(np.nanmin(values)), required, str(data[kind].to_numpy()[part]), unit)
+
+
+def families_short_of_pitting(data: xr.Dataset, rating: RatingSection) -> frozenset[str]:
+    """Return the families of meshes with a flank whose safety against pitting is below the required one."""
+    safety = np.fmin.reduce([data[f"flank_{name}"].to_numpy() for name in CONTACT_SAFETIES])
+    short = data["flank"].to_numpy()[safety < rating.minimum_S_H]
+    return frozenset(str(flank).rpartition(" ")[2] for flank in short)
 
 
 def shortfalls_of(data: xr.Dataset) -> list[str]:
@@ -115,3 +124,17 @@ def margins_in_words(before: Mapping[str, Margin], after: Mapping[str, Margin]) 
         kind = "at most" if margin.is_largest else "required"
         changes.append(f"{name} {old.value:{form}} to {margin.value:{form}}{unit} ({margin.required:{form}} {kind})")
     return "; ".join(changes)
+
+
+def raised_in_words(before: Mapping[str, Margin], after: Mapping[str, Margin], name: str) -> str:
+    """Describe how a margin rises; empty if it does not, or is unknown.
+
+    Examples
+    --------
+    >>> low, high = {"S_H": Margin(0.77, 1.0, "pinion")}, {"S_H": Margin(0.97, 1.0, "pinion")}
+    >>> raised_in_words(low, high, "S_H"), raised_in_words(high, low, "S_H")
+    ('S_H 0.77 to 0.97 (1 required)', '')
+    """
+    if name not in before or name not in after or after[name].value <= before[name].value:
+        return ""
+    return margins_in_words({name: before[name]}, {name: after[name]})

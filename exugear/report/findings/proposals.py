@@ -17,6 +17,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.sections.connections import CONTACT_ANGLES_DEG
 from exugear.gearbox.sections.gears import ModificationSection
 from exugear.gearbox.units import MM, UM
+from exugear.report.findings.margins import PITTING
 from fe_ste.geometry.gears import GearPair
 from fe_ste.geometry.involute import involute
 
@@ -53,6 +54,8 @@ class DesignChange:
     """New values by key of the gearbox file; empty for what is not proposed."""
     reason: str = ""
     """Why it is not proposed."""
+    requirement: str = ""
+    """Margin of `exugear.report.findings.margins` that it is to raise; such a change is always rated."""
 
 
 def propose_changes(
@@ -225,6 +228,35 @@ def _modification_changes(gearbox: Gearbox, name: str, pair: GearPair, deflectio
         key = f"gears.{both[0]}.modification.lead_crowning_um"
         yield DesignChange(f"{name}-crowning-{amount:g}", words, "modification", {key: crowned})
     yield from _less(name, sections, amounts)
+
+
+def alignment_change(gearbox: Gearbox, family: str, opening: float) -> DesignChange | None:
+    """Helix slope that closes the gap between the flanks of misaligned gears; None for less than half a micrometre.
+
+    It is on the pinion, or on the other gear if only that one meshes in a single pair.
+
+    Parameters
+    ----------
+    family : of the meshes
+    opening : gap at the +z end of the common face under the static load, m; negative if the teeth carry there
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> print(alignment_change(gearbox, "high_speed", -12e-6).words)
+    high_speed: helix slope 12 µm on hs_pinion, which closes the gap under the static load
+    """
+    pair = next(mesh.pair.name for mesh in gearbox.meshes if mesh.family == family)
+    both = _gear_names(gearbox, pair)
+    pairs_of = {gear: sum(gear in _gear_names(gearbox, other) for other in gearbox.gear_pairs) for gear in both}
+    gear = min(both, key=lambda name: pairs_of[name])
+    present = (gearbox.case.gears[gear].modification or ModificationSection()).helix_slope_um
+    slope = present - round(opening / UM)
+    if slope == present:
+        return None
+    words = f"{pair}: helix slope {slope:g} µm on {gear}, which closes the gap under the static load"
+    keys = {f"gears.{gear}.modification.helix_slope_um": slope}
+    return DesignChange(f"{pair}-helix-slope", words, "modification", keys, requirement=PITTING)
 
 
 def _less(name: str, sections: Mapping[str, ModificationSection], amounts: Sequence[float]) -> Iterator[DesignChange]:

@@ -340,7 +340,7 @@ def _further(
 def _shortfalls(material: ReportData) -> Iterator[str]:
     """Yield parts that fail or fall short of a requirement, at most `SHOWN_SHORTFALLS`.
 
-    They are those of stored ratings, or else of the unchanged gearbox of the design changes.
+    They are those of stored ratings, or else of the unchanged gearbox of the design changes, which also have remedies.
     """
     rated = [shortfalls_of(life) for life in material.ratings.lives]
     if not rated and material.design_study is not None:
@@ -350,6 +350,11 @@ def _shortfalls(material: ReportData) -> Iterator[str]:
             yield f"{material.words.labelled(line)}."
         if len(lines) > SHOWN_SHORTFALLS:
             yield f"{len(lines) - SHOWN_SHORTFALLS} more."
+    if rated and material.design_study is not None:
+        for result in material.design_study.results:
+            if result.remedy:
+                side = f", but it {result.objection}" if result.objection.startswith("raises") else ""
+                yield f"{material.words.labelled(result.change.words)}: {result.remedy}{side}."
 
 
 def _leaders(material: ReportData, headline: Headline, top: Resonance) -> Iterator[str]:

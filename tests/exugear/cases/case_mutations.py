@@ -44,7 +44,7 @@ def bases(folder: Path) -> dict[str, dict[str, Any]]:
     write_plate(folder / "plate.vtu")
     (folder / "series.csv").write_text("time_s,shaft_1_N_m\n0.0,100.0\n1.0,120.0\n", encoding="utf-8")
     (folder / "flank.csv").write_text("radius_mm,-7.0,7.0\n29.0,1.0,0.0\n31.0,0.0,2.0\n", encoding="utf-8")
-    rows = "".join(f"{speed},6,{0.01 * speed},5.0\n" for speed in (0, 1000, 2000))
+    rows = "".join(f"{speed},6,{0.01 * speed},5.0\n" for speed in (0, 1000, 2300))
     (folder / "ripple.csv").write_text(f"speed_rpm,order,amplitude_N_m,phase_deg\n{rows}", encoding="utf-8")
     grc = tomllib.loads((GRC / "gearbox.toml").read_text(encoding="utf-8"))
     return {
@@ -75,9 +75,10 @@ def _with_errors(grc: dict[str, Any]) -> dict[str, Any]:
         "blades": blades | {"direction": "fixed"},
         "unbalance": {"body": "planet_1", "z_mm": 100.0, "unbalance_g_mm": 500.0},
         "machine": {"body": "hss", "table": "ripple.csv", "pole_pairs": 2, "reaction_on": "housing"},
-        "propeller": {"body": "carrier", "orders": [0.5, 5], "torque_percent": [1.0, 4.0]} | growth,
+        "propeller": {"body": "carrier", "orders": [0.5, 5], "torque_percent": [0.02, 0.4]} | growth,
     }
     case["bodies"]["main_shaft"]["enabled"] = True
+    case["bodies"]["housing"]["solid"]["seats"]["machine"] = {"same_as": "hss_bc"}
     case["ste"] = {"positions": 20, "grid": True, "torque_factors": [0.5, 1.0], "misalignment_um": [0.0, 30.0]}
     return case
 

@@ -415,6 +415,7 @@ def test_a_damaged_study_is_one_message(tmp_path: Path, damage: str) -> None:
 
 
 def test_a_rating_that_cannot_be_computed_is_said_instead_of_no_shortfall(grc: Gearbox) -> None:
-    assert design_study._requirements(grc, ({}, ["a: L10 = 1 h, required 2 h"])) == ["a: L10 = 1 h, required 2 h"]
+    rated = design_study.Rated({}, ["a: L10 = 1 h, required 2 h"])
+    assert design_study._requirements(grc, rated) == ["a: L10 = 1 h, required 2 h"]
     assert design_study._requirements(grc, None) == [f"no requirement is checked: {design_study.NOT_RATED}"]
     assert design_study._requirements(Gearbox.from_dict(tomllib.loads(SPUR_CASE)), None) == []
