@@ -135,6 +135,7 @@ class MeasuredComparison(ReprMixin):
             "window": resolution_text(cuts.run_up),
             "speeds_rpm": [float(cuts.speed.min()) / RPM, float(cuts.speed.max()) / RPM],
             "deviation_dB": _known(cuts.deviation()),
+            "deviation_without_means_dB": _known(cuts.deviation_of_shapes),
             "speed_stretch": self.stretch,
             "speed_shift_percent": 100.0 * self.speed_shift,
             "channels": [

@@ -325,6 +325,66 @@ def test_a_key_that_cannot_be_fitted_ends_with_code_2(short: Path, keys: str, me
     assert not (short.parent / "results").exists()
 
 
+def test_a_copy_is_refused_before_anything_is_computed(short: Path) -> None:
+    path = synthetic.gearbox_file(short.parent, synthetic.measurement())
+    (short.parent / "old.toml").write_text("# mine\n")
+    for copy, fit, words in (
+        ("old.toml", ["--fit", "housing.factor"], "old.toml: exists and is not overwritten"),
+        ("other/new.toml", ["--fit", "housing.factor"], "be in the folder of the gearbox file"),
+        ("new.txt", ["--fit", "housing.factor"], "must end in .toml"),
+        ("new.toml", [], "requires --fit"),
+    ):
+        outcome = exugear("measured", path, "--out", short.parent / "results", *fit, "--write", short.parent / copy)
+        assert outcome.exit_code == 2
+        assert words in outcome.stderr.replace("\n", ""), outcome.stderr
+    assert {own.name for own in short.parent.iterdir()} == {"gearbox.toml", "bench.h5", "old.toml"}
+    assert (short.parent / "old.toml").read_text() == "# mine\n"
+
+
+@pytest.mark.validation
+def test_the_written_file_has_the_fitted_numbers_and_the_deviation_of_the_fit(bench: Bench, tmp_path: Path) -> None:
+    """Started at 0.55 for 0.5: the copy differs in this number alone, is valid, and deviates as the fit states.
+
+    The fit computes at 240 speeds, the comparison at more: within the 0.02 dB that its intervals allow for.
+    """
+    part = slice(0, 180_000)
+    synthetic.recorded(
+        tmp_path / "bench.h5", {name: own[part] for name, own in bench.signals.items()}, bench.angle[part]
+    )
+    path = synthetic.gearbox_file(tmp_path, synthetic.measurement(harmonics=2))
+    out, copy = tmp_path / "r", tmp_path / "new.toml"
+    text = re.sub(r'("housing" = \{[^}]*?"factor" =) 0.5\b', r"# seats\n\1 0.55", path.read_text()) + "# end\n"
+    assert text.count('factor" = 0.55') == 1
+    path.write_text(text)
+    outcome = exugear("measured", path, "--out", out, "--fit", "housing.factor", "--write", copy, "--json")
+    assert outcome.exit_code == 0, outcome.stderr
+    fit = json.loads(outcome.stdout)["fit"]
+    value = float(f"{fit['parameters'][0]['value']:.6g}")
+    assert value == pytest.approx(0.5, rel=2e-3)
+    assert copy.read_text() == text.replace('factor" = 0.55', f'factor" = {value!r}')
+    assert exugear("check", copy).exit_code == 0
+    again = json.loads(exugear("measured", copy, "--out", out, "--json").stdout)
+    assert again["deviation_without_means_dB"] == pytest.approx(fit["deviation_dB"], abs=0.02)
+    assert fit["deviation_before_dB"] > 10.0 * again["deviation_without_means_dB"]
+
+
+@pytest.mark.validation
+@pytest.mark.long
+def test_undetermined_numbers_are_not_written(bench: Bench, tmp_path: Path) -> None:
+    """Below all resonances (600 to 850 rpm) damping changes nothing; results are still printed."""
+    part = slice(0, 60_000)
+    slow = {name: own[part] for name, own in bench.signals.items()}
+    synthetic.recorded(tmp_path / "bench.h5", slow, bench.angle[part])
+    path = synthetic.gearbox_file(tmp_path, synthetic.measurement(harmonics=3))
+    copy = tmp_path / "new.toml"
+    key = "damping.modal_percent"
+    outcome = exugear("measured", path, "--out", tmp_path / "r", "--fit", key, "--write", copy)
+    assert outcome.exit_code == 1
+    assert f"Fit: {key} is not determined" in outcome.stdout
+    assert f"--write: nothing is written; {key} is not determined" in outcome.stderr.replace("\n", " ")
+    assert not copy.exists()
+
+
 @pytest.mark.parametrize("damage", ["truncated", "no name", "two measurements"])
 def test_a_bad_recording_or_name_ends_with_code_2_and_writes_nothing(short: Path, damage: str) -> None:
     folder = short.parent
