@@ -46,7 +46,7 @@ def measured(
         if not keys:
             raise BadInputError(f"--write {copy}: requires --fit with the keys whose fitted values are written")
         project.gearbox.check_copy(copy)
-    at_load = project if run_up.section.load_case is None else project.at_load_case(run_up.section.load_case)
+    at_load = project.at_measured_load(run_up)
     response_settings(at_load.gearbox, run_up, method)
     with suppress(FailedError):  # such a failure does not apply to the selected mesh model
         if reason := steady_lack(assembled_by_iso(at_load.gearbox, at_load.choice.variant), at_load.choice.variant):

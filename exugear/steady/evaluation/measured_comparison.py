@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from exugear.gearbox.units import RPM
 from exugear.gearbox.versions import MEASURED
 from exugear.results.findings import Finding
 from exugear.results.order_tracking.foreign_orders import OrderInSpectrum
+from exugear.results.spectra.diagrams import draw_waterfall
+from exugear.results.spectra.waterfall import sweep_matched_window, waterfall
 from exugear.steady.evaluation.comparison import (
     ComparedCuts,
     PeakPair,
@@ -32,6 +34,7 @@ from exugear.steady.evaluation.mistakes import (
     drift_finding,
     foreign_finding,
     level_findings,
+    load_finding,
     measured_foreign_orders,
     recording_findings,
     shift_finding,
@@ -100,27 +103,36 @@ class MeasuredComparison(ReprMixin):
         """Computed over measured speed of resonances minus 1: see `resonance_shift`."""
         return resonance_shift(self.peaks, self.stretch)
 
-    def plot(self, channel: str | None = None, ax: Axes | None = None) -> Axes:
-        """Draw measured and computed order cuts of a channel over the speed, with the band of plausible damping.
+    def plot(
+        self, channel: str | None = None, kind: Literal["cuts", "waterfall"] = "cuts", ax: Axes | None = None
+    ) -> Axes:
+        """Draw a channel: measured and computed order cuts over the speed, or the waterfall of the measurement.
 
-        Orders are those with the highest measured amplitudes. The steady-state response, neither swept nor averaged, is
-        dotted.
+        Cuts are those of the orders with the highest measured amplitudes, with the band of plausible damping. The
+        steady-state response, neither swept nor averaged, is dotted. The waterfall has the axes and order lines of that
+        of a run (`exugear.transient.outcome.Run.plot`).
 
         Parameters
         ----------
         channel : name of the channel; the first one by default
+        kind : ``cuts`` or ``waterfall``
         ax : matplotlib axes; by default new ones, whose ``ax.figure`` can be shown and saved
 
         Raises
         ------
         ValueError
-            There is no such channel.
+            There is no such channel or kind.
         """
+        if kind not in ("cuts", "waterfall"):
+            raise ValueError(f"kind = {kind!r}: must be one of cuts, waterfall")
         names = [own.name for own in self.cuts.run_up.channels]
         if channel is not None and channel not in names:
             raise ValueError(f"channel = {channel!r}: must be one of {', '.join(names)}")
+        place = 0 if channel is None else names.index(channel)
+        if kind == "waterfall":
+            return _draw_waterfall(self.cuts, place, ax)
         with axes_or_new(ax, COLUMN_WIDTHS[2], 4.0) as panel:
-            _draw_channel(panel, self.cuts, 0 if channel is None else names.index(channel))
+            _draw_channel(panel, self.cuts, place)
             panel.set_xlabel("Input speed / rpm")
             panel.legend(ncols=2)
             return panel
@@ -312,6 +324,7 @@ def compare_run_up(
     found: Sequence[Iterator[Finding]] = (
         speed_finding(gearbox, run_up, spectrum),
         recording_findings(run_up),
+        load_finding(run_up),
         band_findings(cuts),
         drift_finding(cuts),
         level_findings(cuts),
@@ -353,6 +366,24 @@ def _draw_channel(panel: Axes, cuts: ComparedCuts, channel: int) -> None:
     panel.yaxis.set_major_formatter("{x:g}")
     panel.set_ylabel(drawable(f"{own.name}: {own.quantity.replace('_', ' ')}, ± {unit}"))
     panel.set_title("solid: measured; dashed: computed, swept; dotted: steady; band: damping", loc="left", fontsize=7.0)
+
+
+def _draw_waterfall(cuts: ComparedCuts, channel: int, ax: Axes | None) -> Axes:
+    """Draw the waterfall of a channel up to 1.1 times the frequency of the highest order, with the compared orders."""
+    run_up = cuts.run_up
+    own, shaft = run_up.channels[channel], run_up.shaft
+    top = max(float(line.frequency(float(shaft.speed.max()))) for line in cuts.lines)
+    span = shaft.angle.size / shaft.rate
+    spectra = waterfall(
+        run_up.values[channel],
+        shaft.speed,
+        shaft.rate,
+        window_length=min(sweep_matched_window(top * (1.0 - shaft.speed.min() / shaft.speed.max()) / span), 0.1 * span),
+        reference=1e-6 if own.unit == "m" else 1.0,
+        unit=own.unit,
+    )
+    quantity = f"{own.name}: {own.quantity.replace('_', ' ')}"
+    return draw_waterfall(spectra, cuts.lines, ax, highest_frequency=1.1 * top, quantity=quantity)
 
 
 def _known(value: float) -> float | None:

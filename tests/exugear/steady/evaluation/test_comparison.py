@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 import xarray as xr
@@ -19,7 +20,8 @@ from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.units import RPM, STANDARD_GRAVITY
 from exugear.project import Project
 from exugear.steady.evaluation.measured_comparison import MeasuredComparison, compare_run_up
-from exugear.steady.evaluation.run_up import read_run_up, response_settings
+from exugear.steady.evaluation.mistakes import load_finding
+from exugear.steady.evaluation.run_up import MeasuredTorque, gearbox_at_torque, read_run_up, response_settings
 from exugear.steady.mean_system.planet_sets import SteadyError
 
 from ...cases.command import exugear
@@ -179,6 +181,14 @@ def left(**changes: Any) -> dict[str, Any]:
     return {"channels": {"left": {**synthetic.CHANNELS["left"], **changes}}}
 
 
+TORQUE = {"quantity": "torque", "body": "input", "unit": "N m"}
+
+
+def with_torque(**changes: Any) -> dict[str, Any]:
+    torque = {key: value for key, value in {**TORQUE, **changes}.items() if value is not None}
+    return {"channels": {**synthetic.CHANNELS, "torque": torque}}
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -198,6 +208,16 @@ def left(**changes: Any) -> dict[str, Any]:
         (left(full_scale=5.0), "full_scale requires unit"),
         ({"channels": {"te": {"quantity": "transmission_error"}}}, "channel 'te' has no unit in the file.* set unit"),
         ({"channels": {"up": synthetic.CHANNELS["left"]}}, "no channel 'up'; "),
+        (with_torque(body=None), 'body is required for torque; set body = "BODY"'),
+        (with_torque(body="inputs"), "channels.torque.body = 'inputs': no such body; did you mean 'input'"),
+        (with_torque(place="input_left"), "place does not apply to the torque of a body; remove the key"),
+        (with_torque(unit="N"), "unit = 'N': a unit of force; set a unit of torque, such as N m"),
+        (left(body="input"), "body applies to torque only; remove it"),
+        ({"channels": {"torque": TORQUE}}, "no channel is compared; add one of another quantity than torque"),
+        (
+            {"channels": {"torque": TORQUE, "torque_2": TORQUE, **left()["channels"]}},
+            "channels torque, torque_2 are torques; keep the one",
+        ),
     ],
 )
 def test_an_error_of_the_section_names_key_value_and_remedy(short: Path, change: dict[str, Any], message: str) -> None:
@@ -325,6 +345,95 @@ def test_a_key_that_cannot_be_fitted_ends_with_code_2(short: Path, keys: str, me
     assert not (short.parent / "results").exists()
 
 
+def torques(gearbox: Gearbox) -> dict[str, float]:
+    return dict(gearbox.case.static_load.torques_N_m)
+
+
+def torque_signal(bench: Bench, size: int, at_start: float, at_end: float) -> np.ndarray:
+    """Torque (N m) that rises over the run-up, with vibration at order 20 of half its mean."""
+    mean = 0.5 * (at_start + at_end)
+    return np.linspace(at_start, at_end, size) + 0.5 * mean * np.cos(20.0 * bench.angle[:size])
+
+
+@pytest.mark.parametrize("body", ["input", "output"])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_static_load_is_scaled_to_the_mean_torque_of_any_loaded_body(short: Path, body: str, sign: float) -> None:
+    """1.3 times the static torque of the input, or of the output whose reaction follows from the ratio."""
+    nominal = Gearbox.from_dict(synthetic.content())
+    static = nominal.train.static_torques[body]
+    with h5py.File(short, "a") as file:
+        file["torque"] = np.full(file["left"].shape, sign * 1.3 * static)
+    path = synthetic.gearbox_file(short.parent, synthetic.measurement(**with_torque(body=body)))
+    project = Project.from_toml(path, short.parent / "results", synthetic.CHOICE)
+    loaded = project.at_measured_load(read_run_up(project.gearbox))
+    assert torques(loaded.gearbox) == pytest.approx({own: 1.3 * value for own, value in torques(nominal).items()})
+    assert loaded.folder.name == "at-measured-bench"
+
+
+def test_a_mean_torque_within_1_percent_of_the_static_load_keeps_its_tables(short: Path) -> None:
+    static = Gearbox.from_dict(synthetic.content()).train.static_torques["input"]
+    with h5py.File(short, "a") as file:
+        file["torque"] = np.full(file["left"].shape, 0.995 * static)
+    path = synthetic.gearbox_file(short.parent, synthetic.measurement(**with_torque()))
+    project = Project.from_toml(path, short.parent / "results", synthetic.CHOICE)
+    assert project.at_measured_load(read_run_up(project.gearbox)) is project
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (
+            {"body": "middle"},
+            "channels.torque.body = 'middle': the static load has no torque on it; name one of input, output",
+        ),
+        ({}, "channels.torque: the mean torque is zero; connect its sensor"),
+    ],
+)
+def test_a_torque_that_sets_no_load_is_refused(short: Path, changes: dict[str, Any], message: str) -> None:
+    with h5py.File(short, "a") as file:
+        file["torque"] = np.zeros(file["left"].shape)
+    gearbox = Gearbox.from_toml(synthetic.gearbox_file(short.parent, synthetic.measurement(**with_torque(**changes))))
+    with pytest.raises(GearboxFileError, match=message):
+        gearbox_at_torque(gearbox, read_run_up(gearbox))
+
+
+@pytest.mark.parametrize(
+    ("ends", "level", "words"),
+    [
+        ((98.0, 102.0), "note", r"torque of input: mean 100 N m, 98 to 102 N m .* levels by -0.17 to \+0.18 dB"),
+        ((80.0, 120.0), "warning", r"levels by -1.56 to \+1.90 dB where vibration is proportional to the torque"),
+        ((-20.0, 220.0), "warning", "it changes its sign, so that teeth separate"),
+    ],
+)
+def test_the_variation_of_the_torque_is_stated_with_its_effect(
+    good: MeasuredComparison, bench: Bench, ends: tuple[float, float], level: str, words: str
+) -> None:
+    """A torque that rises linearly; its vibration at a shaft order averages out."""
+    own = MeasuredTorque.of("input", torque_signal(bench, bench.angle.size, *ends))
+    (finding,) = load_finding(replace(good.cuts.run_up, torque=own))
+    assert finding.level == level
+    assert re.search(words, finding.text), finding.text
+
+
+@pytest.mark.validation
+def test_levels_of_another_load_agree_where_the_torque_is_measured(tmp_path: Path) -> None:
+    """Signals at 1.4 times the static load: 0.1 dB rms with the channel of the torque.
+
+    Without, it is more than 20 lg 1.4 = 2.9 dB: stiffer bearings shift the resonances as well.
+    """
+    time, speed, angle = synthetic.run_up(20.0)
+    gearbox = Gearbox.from_dict(synthetic.content())
+    loaded = gearbox.varied({"static_load.torques_N_m": {own: 1.4 * value for own, value in torques(gearbox).items()}})
+    signals = synthetic.signals(synthetic.response(loaded), speed, angle, 0.05)
+    torque = 1.4 * gearbox.train.static_torques["input"] * (1.0 + 0.1 * np.cos(20.0 * angle))
+    synthetic.recorded(tmp_path / "bench.h5", {**signals, "torque": torque}, angle)
+    sections = (synthetic.measurement(**with_torque()), synthetic.measurement())
+    project = Project.from_toml(synthetic.gearbox_file(tmp_path, *sections), tmp_path / "r", synthetic.CHOICE)
+    with_channel, without = project.measured("bench"), project.measured("bench_2")
+    assert with_channel.cuts.deviation() < 0.1
+    assert without.cuts.deviation() > 20.0 * np.log10(1.4)
+
+
 def test_a_copy_is_refused_before_anything_is_computed(short: Path) -> None:
     path = synthetic.gearbox_file(short.parent, synthetic.measurement())
     (short.parent / "old.toml").write_text("# mine\n")
@@ -409,3 +518,26 @@ def test_a_channel_can_be_drawn_alone(good: MeasuredComparison) -> None:
     assert axes.get_ylabel() == "te: transmission error, ± µm"
     with pytest.raises(ValueError, match="channel = 'top': must be one of left, right, te"):
         good.plot("top")
+
+
+def test_the_waterfall_of_a_measurement_has_the_axes_of_that_of_a_run(good: MeasuredComparison, bench: Bench) -> None:
+    """Speed, frequency up to 1.1 times that of the highest order, and level with its reference; highest along an order.
+
+    The highest cell lies on an order of the gearbox within a cell of the picture and the main lobe of the window.
+    """
+    axes = good.plot("te", "waterfall")
+    top = 1.1 * max(line.order for line in good.cuts.lines) * bench.speed.max() / (2.0 * np.pi)
+    assert axes.get_xlabel() == "Input speed / rpm" and axes.get_ylabel() == "Frequency / kHz"
+    assert axes.get_xlim() == pytest.approx((0.0, bench.speed.max() / RPM), rel=0.02)
+    assert axes.get_ylim() == pytest.approx((0.0, 1e-3 * top), rel=0.02)
+    bar = axes.figure.axes[-1].get_ylabel()
+    assert bar.startswith("Te: transmission error, level / dB re 1"), bar
+    (image,) = axes.get_images()
+    levels = np.asarray(image.get_array().filled(-np.inf))
+    row, column = np.unravel_index(int(np.nanargmax(levels)), levels.shape)
+    speed = (column + 0.5) / levels.shape[1] * axes.get_xlim()[1] * RPM
+    frequency = 1e3 * (row + 0.5) / levels.shape[0] * axes.get_ylim()[1]
+    order = 2.0 * np.pi * frequency / speed
+    assert min(abs(order / line.order - 1.0) for line in good.cuts.lines) < 0.05
+    with pytest.raises(ValueError, match="kind = 'shape': must be one of cuts, waterfall"):
+        good.plot("te", "shape")  # type: ignore[arg-type]
