@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -17,7 +16,7 @@ from exugear.results.findings import Finding
 from exugear.results.order_tracking.angle_cuts import TooShortError
 from exugear.steady.evaluation.fit import FitError, ParameterFit
 from exugear.steady.evaluation.fitted_response import start_of_fit
-from exugear.steady.evaluation.measured_comparison import DRAWN_UNITS, MeasuredComparison
+from exugear.steady.evaluation.measured_comparison import DRAWN_UNITS
 from exugear.steady.evaluation.run_up import read_run_up, response_settings
 from exugear.steady.settings import Method, check_law
 
@@ -71,7 +70,7 @@ def measured(
     path = at_load.measured_path(run_up.name)
     summary = {"case": project.gearbox.source, "variant": str(project.choice.variant), **comparison.summary()}
     Outcome(
-        verdict=_verdict(summary, comparison),
+        verdict=comparison.verdict,
         further=[
             *([_foreign(summary)] if summary["foreign_orders"] else []),
             *lines,
@@ -82,20 +81,6 @@ def measured(
         path=f"{path}, CSV tables, {path.with_suffix('.png').name}",
         failure=failure,
     ).show(as_json, whole)
-
-
-def _verdict(summary: Mapping[str, Any], comparison: MeasuredComparison) -> str:
-    """Return how well levels and peaks agree, in one line."""
-    deviation = summary["deviation_dB"]
-    if deviation is None:
-        return f"{summary['measurement']}: no measured order is above its background"
-    text = f"{summary['measurement']}: computed levels within {deviation:.2f} dB (rms)"
-    measured_peaks = sum(not math.isnan(peak.measured_speed) for peak in comparison.peaks)
-    if measured_peaks:
-        text += f", {comparison.paired} of {measured_peaks} measured peaks found"
-        shift = summary["speed_shift_percent"]
-        text += f", speeds {shift:+.1f} %" if abs(shift) > 0.05 else ""
-    return text
 
 
 def _foreign(summary: Mapping[str, Any]) -> str:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.sections.measurements import MeasurementSection
 from exugear.gearbox.units import RPM
 from exugear.gearbox.versions import MEASURED
 from exugear.results.findings import Finding
@@ -54,7 +55,7 @@ from fe_ste.tools.drawing import (
     new_figure,
 )
 from fe_ste.tools.files import write_table
-from fe_ste.tools.stores import Store
+from fe_ste.tools.stores import Layout, Store, load_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -66,6 +67,16 @@ MOST_DRAWN_ORDERS = 4
 """Maximum number of orders in a diagram: those with the highest measured amplitudes."""
 DRAWN_UNITS = {"m": ("µm", 1e6), "N": ("N", 1.0), "m/s": ("mm/s", 1e3), "m/s2": ("m/s²", 1.0)}
 """Unit of diagrams and tables, and its factor, by SI unit."""
+
+
+_LAYOUT = Layout(
+    "comparison with a measured run-up",
+    MEASURED,
+    dict.fromkeys(("measured", "background", "computed", "steady"), ("channel", "line", "window"))
+    | {"time": ("window",), "speed": ("window",), "order": ("line",), "line": ("line",)}
+    | dict.fromkeys(("channel", "quantity", "where", "unit"), ("channel",)),
+    ("measurement", "recording_sha256", "input_hash", "window", "verdict", "peaks", "foreign_orders", "warnings"),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +103,19 @@ class MeasuredComparison(ReprMixin):
         names = [channel.name for channel in self.cuts.run_up.channels]
         rows = {name: f"{self.cuts.deviation(place):.2f} dB (rms)" for place, name in enumerate(names)}
         return f"Comparison with {self.cuts.run_up.name}", {**rows, "peaks": str(len(self.peaks))}
+
+    @property
+    def verdict(self) -> str:
+        """How well levels and peaks agree, in one line."""
+        deviation = self.cuts.deviation()
+        if math.isnan(deviation):
+            return f"{self.cuts.run_up.name}: no measured order is above its background"
+        text = f"{self.cuts.run_up.name}: computed levels within {deviation:.2f} dB (rms)"
+        measured_peaks = sum(not math.isnan(peak.measured_speed) for peak in self.peaks)
+        if measured_peaks:
+            text += f", {self.paired} of {measured_peaks} measured peaks found"
+            text += f", speeds {100.0 * self.speed_shift:+.1f} %" if abs(self.speed_shift) > 0.0005 else ""
+        return text
 
     @property
     def paired(self) -> int:
@@ -240,7 +264,10 @@ class MeasuredComparison(ReprMixin):
             "time": (("window",), cuts.time, {"units": "s", "long_name": "centre of the window in the recording"}),
             "speed": (("window",), cuts.speed, {"units": "rad/s", "long_name": "speed of the overall input"}),
             "order": (("line",), [line.order for line in cuts.lines], {"units": "1"}),
-            "unit": (("channel",), np.array([own.unit for own in cuts.run_up.channels], dtype=object), {}),
+        }
+        variables |= {
+            name: (("channel",), np.array([getattr(own, name) for own in cuts.run_up.channels], dtype=object), {})
+            for name in ("quantity", "where", "unit")
         }
         names = {
             "channel": [own.name for own in cuts.run_up.channels],
@@ -253,6 +280,8 @@ class MeasuredComparison(ReprMixin):
             "recording_sha256": cuts.run_up.digest,
             "window": summary["window"],
             "speed_stretch": self.stretch,
+            "verdict": self.verdict,
+            "warnings": json.dumps([own.text for own in self.findings if own.level == "warning"]),
             "peaks": json.dumps(summary["peaks"]),
             "foreign_orders": json.dumps(summary["foreign_orders"]),
         }
@@ -332,7 +361,6 @@ def compare_run_up(
         coverage_finding(cuts),
         shift_finding(resonance_shift(peaks, stretch)),
     )
-    key = [MEASURED, run_up.digest, run_up.section.model_dump(mode="json"), str(response.attrs["input_hash"])]
     return MeasuredComparison(
         cuts=cuts,
         stretch=stretch,
@@ -340,8 +368,25 @@ def compare_run_up(
         foreign=foreign,
         findings=tuple(finding for part in found for finding in part),
         harmonics=int(response.attrs["harmonics"]),
-        input_hash=hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest(),
+        input_hash=comparison_hash(run_up.digest, run_up.section, str(response.attrs["input_hash"])),
     )
+
+
+def comparison_hash(digest: str, section: MeasurementSection, response_hash: str) -> str:
+    """SHA-256 of all that a comparison depends on: recording (its SHA-256), section, and input of the response."""
+    key = [MEASURED, digest, section.model_dump(mode="json"), response_hash]
+    return hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()
+
+
+def load_comparison(path: Path) -> xr.Dataset:
+    """Read what `MeasuredComparison.write` wrote.
+
+    Raises
+    ------
+    FileError
+        The file is missing, damaged, or of another version.
+    """
+    return load_dataset(path, _LAYOUT)
 
 
 def _draw_channel(panel: Axes, cuts: ComparedCuts, channel: int) -> None:
