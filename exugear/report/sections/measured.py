@@ -11,10 +11,13 @@ from exugear.gearbox.units import RPM
 from exugear.report.findings.context import choice_of, model_label
 from exugear.report.sections.material import ChartAxis, Curve, ReportData, model_name
 from exugear.report.web.html import Cell, Figure, Table
-from exugear.steady.evaluation.measured_comparison import DRAWN_RANGE, DRAWN_UNITS, MOST_DRAWN_ORDERS
+from exugear.steady.evaluation.measured_comparison import DRAWN_RANGE, DRAWN_UNITS
 
 if TYPE_CHECKING:
     import xarray as xr
+
+CHART_ORDERS = 3
+"""Number of orders of a chart, those with the highest measured amplitudes: its curves differ in colour."""
 
 
 def measured_run_ups(material: ReportData) -> list[dict[str, Any]]:
@@ -44,12 +47,15 @@ def _chart(material: ReportData, data: xr.Dataset, number: int, name: str) -> Fi
     """Draw the highest orders of a channel over the speed, down to the range of the diagram of the command."""
     channel, quantity = str(data["channel"][number].item()), str(data["quantity"][number].item()).replace("_", " ")
     unit, factor = DRAWN_UNITS[str(data["unit"][number].item())]
-    measured, computed = (factor * data[kind].to_numpy()[number] for kind in ("measured", "computed"))
-    highest = np.nan_to_num(measured).max(axis=1)
+    with np.errstate(divide="ignore"):
+        measured, computed = (
+            20.0 * np.log10(factor * data[kind].to_numpy()[number]) for kind in ("measured", "computed")
+        )
+    highest = np.where(np.isfinite(measured), measured, -np.inf).max(axis=1)
     speed = data["speed"].to_numpy() / RPM
-    floor = float(highest.max()) * 10.0 ** (-DRAWN_RANGE / 20.0)
+    floor = float(highest.max()) - DRAWN_RANGE
     curves = []
-    for line in sorted(np.argsort(-highest)[:MOST_DRAWN_ORDERS]):
+    for line in sorted(np.argsort(-highest)[:CHART_ORDERS]):
         words = material.words.labelled(str(data["line"][line].item()))
         for kind, values, style in (("measured", measured, "line"), ("computed", computed, "dashed")):
             shown = np.where(values[line] > floor, values[line], np.nan)
@@ -59,9 +65,9 @@ def _chart(material: ReportData, data: xr.Dataset, number: int, name: str) -> Fi
         f"{name}-{channel}",
         f"{channel}: {quantity}, {where}",
         "Solid: measured; dashed: computed, swept along the measured speed.",
-        f"Amplitudes (zero-to-peak) of the orders of {channel}; the peaks are in the table.",
+        f"Levels of the zero-to-peak amplitudes of the orders of {channel}; the peaks are in the table.",
         curves,
-        [ChartAxis(f"{material.input_words} speed / rpm"), ChartAxis(f"amplitude / {unit}", logarithmic=True)],
+        [ChartAxis(f"{material.input_words} speed / rpm"), ChartAxis(f"level / dB re 1 {unit}")],
     )
 
 
