@@ -354,7 +354,7 @@ class Project(ReprMixin):
         from exugear.steady.steady_file import stored_or_computed
 
         found = run_up if isinstance(run_up, MeasuredRunUp) else read_run_up(self.gearbox, run_up)
-        loaded = self if found.section.load_case is None else self.at_load_case(found.section.load_case)
+        loaded = self.at_measured_load(found)
         settings = response_settings(loaded.gearbox, found, method)
         assembly = loaded.assembly()
         path = loaded.measured_path(found.name)
@@ -365,6 +365,25 @@ class Project(ReprMixin):
             comparison = compare_run_up(loaded.gearbox, found, response, limits)
             comparison.write(path)
         return comparison
+
+    def at_measured_load(self, run_up: MeasuredRunUp) -> Self:
+        """Return the same gearbox at the load of a measured run-up: of its load case, scaled to its mean torque.
+
+        Results at a mean torque that differs by more than 1 % go to the subfolder ``at-measured-NAME``.
+
+        Raises
+        ------
+        GearboxFileError
+            There is no such load case, or the static load has no torque on the body of the measured torque.
+        """
+        from exugear.steady.evaluation.run_up import gearbox_at_torque
+
+        case = run_up.section.load_case
+        loaded = self if case is None else self.at_load_case(case)
+        gearbox = gearbox_at_torque(loaded.gearbox, run_up)
+        if gearbox is loaded.gearbox:
+            return loaded
+        return loaded.replaced(gearbox, loaded.folder / f"at-measured-{run_up.name}")
 
     def fit_measured(
         self, comparison: MeasuredComparison, keys: Sequence[str], method: Method = "parametric"
@@ -390,8 +409,7 @@ class Project(ReprMixin):
         from exugear.steady.evaluation.run_up import response_settings
 
         cuts = comparison.cuts
-        case = cuts.run_up.section.load_case
-        loaded = self if case is None else self.at_load_case(case)
+        loaded = self.at_measured_load(cuts.run_up)
         settings = response_settings(loaded.gearbox, cuts.run_up, method)
         start, limits = start_of_fit(loaded.gearbox, keys)
         stiffness, bodies = loaded.stiffness(), loaded.bodies()

@@ -439,6 +439,9 @@ def errors_of_measurements(case: GearboxFile, named_bodies: Mapping[str, Body]) 
             if section.place is not None and section.place not in places:
                 known = known_names("bearings and mounts", places, "bearings.NAME", section.place)
                 yield f"{key}.channels.{channel}.place = {section.place!r}: no such place; {known}"
+            if section.body is not None and section.body not in turning:
+                known = known_names("bodies", turning, "bodies.NAME", section.body)
+                yield f"{key}.channels.{channel}.body = {section.body!r}: no such body; {known}"
 
 
 def errors_of_names(elements: Mapping[str, Sequence[Element]]) -> Iterator[str]:

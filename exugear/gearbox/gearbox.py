@@ -10,6 +10,7 @@ from __future__ import annotations
 import difflib
 import inspect
 import math
+import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -34,7 +35,16 @@ from exugear.gearbox.parts import (
     connector_matrix,
     draw_side_view,
 )
-from exugear.gearbox.reading import GearboxFileError, Origin, parse_case, read_toml, readable, shortened
+from exugear.gearbox.reading import (
+    GearboxFileError,
+    Origin,
+    parse_case,
+    parsed_toml,
+    read_text,
+    read_toml,
+    readable,
+    shortened,
+)
 from exugear.gearbox.sections.case import NAMED_TABLES, GearboxFile, SteSection, labels_in_use
 from exugear.gearbox.sections.entries import unusual_values
 from exugear.gearbox.train import SpinConstraint, Train
@@ -44,6 +54,8 @@ from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.standards import iso6336
 from fe_ste.tools.display import ReprMixin, TitledRows
 from fe_ste.tools.drawing import axes_or_new
+from fe_ste.tools.files import write_file
+from fe_ste.tools.toml_text import with_numbers
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -161,6 +173,51 @@ class Gearbox(ReprMixin):
             raise self.error(
                 f"{made[0]}: the file has no entry of this name, and a new one lacks keys; did you mean {near[0]}?"
             ) from error
+
+    def check_copy(self, path: Path) -> None:
+        """Refuse a path to which `write_copy` does not write.
+
+        Raises
+        ------
+        GearboxFileError
+            The path exists, is not in the folder of the gearbox file, or does not end in ``.toml``.
+        """
+        if os.path.lexists(path):
+            raise self.error(f"copy {path}: exists and is not overwritten; name a new file")
+        if path.parent.resolve() != Path(self.source).parent.resolve() or path.suffix != ".toml":
+            raise self.error(
+                f"copy {path}: must end in .toml and be in the folder of the gearbox file, as the files that it names"
+            )
+
+    def write_copy(self, path: Path, numbers: Mapping[str, float]) -> None:
+        """Write a copy of the gearbox file with some numbers replaced; comments, order and spacing are kept.
+
+        The copy is checked before it is written, and written whole or not at all.
+
+        Parameters
+        ----------
+        path : new file in the folder of the gearbox file
+        numbers : values by dotted key, such as ``housing.factor``
+
+        Raises
+        ------
+        GearboxFileError
+            The path is refused, see `check_copy`, the gearbox file has changed since it was read or cannot be read, a
+            key has no single number in it, or a value is out of range.
+        """
+        self.check_copy(path)
+        text = read_text(self.source)
+        if repr(parsed_toml(text, self.source)) != repr(self.content):
+            raise self.error("has changed since it was read; repeat the command")
+        self.varied(numbers)
+        try:
+            changed = with_numbers(text, numbers)
+        except ValueError as error:
+            raise self.error(str(error)) from None
+        try:
+            write_file(path, changed.encode())
+        except OSError as error:
+            raise self.error(f"copy {path}: cannot be written ({error.strerror}); name another file") from error
 
     def error(self, text: str) -> GearboxFileError:
         """Error whose message is the file name followed by `text` (key, value and remedy)."""

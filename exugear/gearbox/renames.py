@@ -6,12 +6,13 @@ comments, order and spacing.
 
 from __future__ import annotations
 
-import re
 import tomllib
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from typing import Any
+
+from fe_ste.tools.toml_text import Token, tokens
 
 
 @dataclass(frozen=True)
@@ -122,7 +123,7 @@ def migrated(text: str) -> tuple[str, list[str]]:
     pieces: list[str] = []
     changes: list[str] = []
     end = 0
-    for token in _Scanner(text).tokens():
+    for token in tokens(text):
         new = _replacement(token, renames)
         if new is None:
             continue
@@ -139,10 +140,12 @@ def migrated(text: str) -> tuple[str, list[str]]:
     return result, changes
 
 
-def _replacement(token: _Token, renames: Sequence[Rename]) -> str | None:
+def _replacement(token: Token, renames: Sequence[Rename]) -> str | None:
     """Return the replacement of a key or string, or None if it is kept."""
     varied = token.value
-    if token.is_key:
+    if token.kind == "other":
+        return None
+    if token.kind == "key":
         new = new_name(token.path, renames)
         if new is not None:
             return new
@@ -166,88 +169,3 @@ def _count(content: Any) -> int:
     if isinstance(content, list):
         return sum(map(_count, content))
     return 1
-
-
-# Positions of keys and strings in the text of a valid TOML file
-
-
-@dataclass(frozen=True)
-class _Token:
-    """A part of a key, or a string that is a value."""
-
-    path: tuple[str, ...]
-    """Names of the tables and of this key, or of the key of the value."""
-    start: int
-    end: int
-    """Position in the text, including quotes."""
-    value: str = ""
-    is_key: bool = True
-
-
-_SPACE = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
-_KEY = re.compile(r'[A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|\'[^\']*\'')
-_STRING = re.compile(r'"""(?:[^\\]|\\.)*?"{3,5}|\'\'\'.*?\'{3,5}|"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\'', re.DOTALL)
-_OTHER = re.compile(r"[^,\]}\n#]+")
-
-
-class _Scanner:
-    """Finds keys and strings in a text that is valid TOML."""
-
-    def __init__(self, text: str) -> None:
-        self.text = text
-        self.place = 0
-
-    def tokens(self) -> Iterator[_Token]:
-        table: tuple[str, ...] = ()
-        while self._skip() < len(self.text):
-            if self.text[self.place] == "[":
-                self.place += 1 + self.text.startswith("[[", self.place)
-                table = yield from self._key(())
-                self.place = self.text.index("]", self.place) + 1
-                self.place += self.text.startswith("]", self.place)
-            else:
-                yield from self._assignment(table)
-
-    def _skip(self) -> int:
-        found = _SPACE.match(self.text, self.place)
-        assert found is not None
-        self.place = found.end()
-        return self.place
-
-    def _key(self, table: tuple[str, ...]) -> Generator[_Token, None, tuple[str, ...]]:
-        path = table
-        while True:
-            self._skip()
-            found = _KEY.match(self.text, self.place)
-            assert found is not None
-            path = (*path, found[0].strip("\"'"))
-            yield _Token(path, *found.span())
-            self.place = found.end()
-            if self.text[self._skip()] != ".":
-                return path
-            self.place += 1
-
-    def _assignment(self, table: tuple[str, ...]) -> Iterator[_Token]:
-        path = yield from self._key(table)
-        self.place = self.text.index("=", self.place) + 1
-        yield from self._value(path)
-
-    def _value(self, path: tuple[str, ...]) -> Iterator[_Token]:
-        first = self.text[self._skip()]
-        if first in "[{":
-            self.place += 1
-            while self.text[self._skip()] not in "]}":
-                if self.text[self.place] == ",":
-                    self.place += 1
-                elif first == "[":
-                    yield from self._value(path)
-                else:
-                    yield from self._assignment(path)
-            self.place += 1
-        elif found := _STRING.match(self.text, self.place):
-            yield _Token(path, *found.span(), found[0].strip("\"'"), is_key=False)
-            self.place = found.end()
-        else:
-            found = _OTHER.match(self.text, self.place)
-            assert found is not None
-            self.place = found.end()

@@ -77,6 +77,7 @@ MEASURED_UNITS: Final = {
     "transmission_error": ("length", "um"),
     "force": ("force", "N"),
     "speed": ("speed", "rpm"),
+    "torque": ("torque", "N m"),
 }
 """Quantity of the unit of each measured quantity, and units that a message states as examples."""
 UNITS: Final = {text: Unit(quantity, size) for quantity, sizes in _BY_QUANTITY.items() for text, size in sizes.items()}

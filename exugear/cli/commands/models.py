@@ -195,6 +195,15 @@ def measured(
             show_default=False,
         ),
     ] = None,
+    write: Annotated[
+        Path | None,
+        typer.Option(
+            "--write",
+            metavar="FILE",
+            help="Write the gearbox file with the fitted numbers to a new file beside it; comments are kept.",
+            show_default=False,
+        ),
+    ] = None,
     out: options.OutOption = None,
     allow_dir: options.FilesBelowOption = None,
     scripts: options.ScriptsOption = False,
@@ -210,7 +219,7 @@ def measured(
     from exugear.cli.watched import open_project
 
     project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias)
-    task.measured(project, name, method, fit, as_json, whole)
+    task.measured(project, name, method, fit, write, as_json, whole)
 
 
 def run(

@@ -2,28 +2,38 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 from exugear.cli.case import assembled_by_iso, check_friction, steady_lack
 from exugear.cli.console import BadInputError, FailedError
 from exugear.cli.tables import Column, Outcome, Table, detail, significant
 from exugear.cli.watched import WatchedProject
+from exugear.gearbox.reading import GearboxFileError
 from exugear.results.findings import Finding
 from exugear.results.order_tracking.angle_cuts import TooShortError
 from exugear.steady.evaluation.fit import FitError, ParameterFit
 from exugear.steady.evaluation.fitted_response import start_of_fit
-from exugear.steady.evaluation.measured_comparison import DRAWN_UNITS, MeasuredComparison
+from exugear.steady.evaluation.measured_comparison import DRAWN_UNITS
 from exugear.steady.evaluation.run_up import read_run_up, response_settings
 from exugear.steady.settings import Method, check_law
 
 
 def measured(
-    project: WatchedProject, name: str | None, method: Method, fitted: str | None, as_json: bool, whole: bool
+    project: WatchedProject,
+    name: str | None,
+    method: Method,
+    fitted: str | None,
+    copy: Path | None,
+    as_json: bool,
+    whole: bool,
 ) -> None:
-    """Compare, store and print a measured run-up of a project; fit some keys (comma-separated) to it."""
+    """Compare, store and print a measured run-up of a project.
+
+    Keys (comma-separated) are fitted to it, and a copy of the gearbox file with their values is written.
+    """
     check_law(project.choice.mesh_model, method)
     run_up = read_run_up(project.gearbox, name)
     keys = [key.strip() for key in fitted.split(",")] if fitted is not None else []
@@ -31,7 +41,11 @@ def measured(
         if method == "nonlinear":
             raise BadInputError("--fit with --method nonlinear: each value takes minutes; use --method parametric")
         start_of_fit(project.gearbox, keys)
-    at_load = project if run_up.section.load_case is None else project.at_load_case(run_up.section.load_case)
+    if copy is not None:
+        if not keys:
+            raise BadInputError(f"--write {copy}: requires --fit with the keys whose fitted values are written")
+        project.gearbox.check_copy(copy)
+    at_load = project.at_measured_load(run_up)
     response_settings(at_load.gearbox, run_up, method)
     with suppress(FailedError):  # such a failure does not apply to the selected mesh model
         if reason := steady_lack(assembled_by_iso(at_load.gearbox, at_load.choice.variant), at_load.choice.variant):
@@ -41,38 +55,32 @@ def measured(
     at_load.prepare()
     try:
         comparison = project.measured(run_up, method)
-        fit = fitted_parameters(project.fit_measured(comparison, keys, method)) if keys else None
+        fit = project.fit_measured(comparison, keys, method) if keys else None
     except TooShortError as error:
         raise BadInputError(f"measurements.{run_up.name}.window_revolutions: {error}") from error
     except FitError as error:
         raise FailedError(f"fit: {error}") from error
+    lines, failure = _fit_lines(fit), ""
+    if copy is not None and fit is not None:
+        try:
+            project.gearbox.write_copy(copy, fit.changes)
+            lines.append(f"Gearbox file with the fitted numbers: {copy}")
+        except (FitError, GearboxFileError) as error:
+            failure = f"--write: nothing is written; {error}"
     path = at_load.measured_path(run_up.name)
     summary = {"case": project.gearbox.source, "variant": str(project.choice.variant), **comparison.summary()}
     Outcome(
-        verdict=_verdict(summary, comparison),
+        verdict=comparison.verdict,
         further=[
             *([_foreign(summary)] if summary["foreign_orders"] else []),
-            *(_fit_line(own) for own in (fit or {"parameters": []})["parameters"]),
+            *lines,
         ],
-        summary={**summary, **({"fit": fit} if fit else {}), "file": str(path)},
+        summary={**summary, **({"fit": fitted_parameters(fit)} if fit else {}), "file": str(path)},
         tables=measured_tables(summary),
         findings=[*comparison.findings, *_undetermined(fit), *_unnoticed()],
         path=f"{path}, CSV tables, {path.with_suffix('.png').name}",
+        failure=failure,
     ).show(as_json, whole)
-
-
-def _verdict(summary: Mapping[str, Any], comparison: MeasuredComparison) -> str:
-    """Return how well levels and peaks agree, in one line."""
-    deviation = summary["deviation_dB"]
-    if deviation is None:
-        return f"{summary['measurement']}: no measured order is above its background"
-    text = f"{summary['measurement']}: computed levels within {deviation:.2f} dB (rms)"
-    measured_peaks = sum(not math.isnan(peak.measured_speed) for peak in comparison.peaks)
-    if measured_peaks:
-        text += f", {comparison.paired} of {measured_peaks} measured peaks found"
-        shift = summary["speed_shift_percent"]
-        text += f", speeds {shift:+.1f} %" if abs(shift) > 0.05 else ""
-    return text
 
 
 def _foreign(summary: Mapping[str, Any]) -> str:
@@ -97,20 +105,24 @@ def fitted_parameters(fit: ParameterFit) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _fit_line(own: Mapping[str, Any]) -> str:
-    """Return a fitted parameter in one line."""
-    low, high = own["interval_95_percent"]
-    if own["refusal"]:
-        return f"Fit: {own['key']} is not determined ({own['refusal']})"
-    return f"Fit: {own['key']} = {own['value']:.4g} ({low:.4g} to {high:.4g}, 95 %), {own['start']:.4g} in the file"
+def _fit_lines(fit: ParameterFit | None) -> list[str]:
+    """Return one line for each fitted parameter."""
+    return [
+        f"Fit: {own.key} is not determined ({own.refusal})"
+        if own.refusal
+        else f"Fit: {own.key} = {own.value:.4g} ({own.low:.4g} to {own.high:.4g}, 95 %), {own.start:.4g} in the file"
+        for own in (fit.parameters if fit is not None else ())
+    ]
 
 
-def _undetermined(fit: Mapping[str, Any] | None) -> list[Finding]:
+def _undetermined(fit: ParameterFit | None) -> list[Finding]:
     """Return what a fit says, and what it assumes."""
     if fit is None:
         return []
-    before, after, count = fit["deviation_before_dB"], fit["deviation_dB"], fit["orders_of_channels"]
-    text = f"fit: {before:.2f} to {after:.2f} dB (rms) without the mean of each channel, {count} orders of channels"
+    text = (
+        f"fit: {fit.before:.2f} to {fit.after:.2f} dB (rms) without the mean of each channel, {fit.series} orders of "
+        "channels"
+    )
     return [
         Finding(
             "note", f"{text}; all other values are those of the file, such as inertias: errors of them shift the fit"

@@ -61,7 +61,7 @@ def read_hdf5(path: Path, wanted: Sequence[str] | None = None) -> Recording:
     """
     with _open(path) as (file, size):
         found = dict(_datasets(path, file))
-        times = {name: data for name, data in found.items() if name.rpartition("/")[2].lower() in TIMES}
+        times = {name: data for name, data in found.items() if _is_time(name, data)}
         signals = {name: data for name, data in found.items() if name not in times}
         longest = max((data.shape[0] for data in signals.values()), default=0)
         names = [name for name, data in signals.items() if wanted is not None or data.shape[0] == longest]
@@ -74,6 +74,12 @@ def read_hdf5(path: Path, wanted: Sequence[str] | None = None) -> Recording:
         rate = common_rate(path, chosen, [rate for rate, _ in axes])
         channels = [RecordedChannel(name, _text(signals[name], _UNITS), _values(signals[name])) for name in chosen]
     return recording_of(path, rate, axes[0][1], channels)
+
+
+def _is_time(name: str, data: h5py.Dataset) -> bool:
+    """Return whether a dataset has the times of samples, by name and unit: T in N m is a channel."""
+    unit = unit_of(_text(data, _UNITS).partition(" since ")[0] or "s", any_case=True)
+    return name.rpartition("/")[2].lower() in TIMES and (unit is None or unit.quantity == "time")
 
 
 @contextmanager

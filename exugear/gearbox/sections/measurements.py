@@ -10,7 +10,7 @@ from exugear.gearbox.sections import entries as q
 from exugear.gearbox.sections.entries import Entries, FileName, Name, Section, Text
 from exugear.gearbox.sections.loads import ChannelName
 
-MeasuredQuantity = Literal["acceleration", "velocity", "displacement", "force", "transmission_error"]
+MeasuredQuantity = Literal["acceleration", "velocity", "displacement", "force", "transmission_error", "torque"]
 _UnitText = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]+$", max_length=40)]
 _Vector = Annotated[tuple[q.DirectionComponent, q.DirectionComponent, q.DirectionComponent], Field(strict=False)]
 
@@ -44,25 +44,36 @@ class MeasuredChannelSection(Section):
     """Name of the channel in the file; by default the name of this table."""
     quantity: MeasuredQuantity
     """Measured quantity. Displacement, velocity and acceleration are those of the seat of a bearing or mount, force is
-    the dynamic force there, and the transmission error is the overall one as a length.
+    the dynamic force there, and the transmission error is the overall one as a length. The mean torque of a shaft sets
+    the load of the computed side; only one channel may have it.
     """
     unit: _UnitText | None = None
     """Unit of its values, such as `g`; by default that of the file."""
     full_scale: q.FullScale | None = None
     """Value at full scale in `unit`, for WAV files."""
     place: Name | None = None
-    """Bearing or mount; not for the transmission error."""
+    """Bearing or mount; not for the transmission error and the torque."""
     direction: Literal["x", "y", "z"] | _Vector | None = None
     """Direction in the axes of the gearbox, as an axis or a vector."""
+    body: Name | None = None
+    """Body whose torque it is, one that `[static_load]` loads or locks; only for the torque."""
 
     @model_validator(mode="after")
     def _place(self) -> MeasuredChannelSection:
-        is_error = self.quantity == "transmission_error"
+        at_place = self.quantity not in ("transmission_error", "torque")
         for key in ("place", "direction"):
-            if is_error and getattr(self, key) is not None:
-                raise ValueError(f"{key} does not apply to the overall transmission error; remove the key")
-            if not is_error and getattr(self, key) is None:
+            if not at_place and getattr(self, key) is not None:
+                what = "torque of a body" if self.quantity == "torque" else "overall transmission error"
+                raise ValueError(f"{key} does not apply to the {what}; remove the key")
+            if at_place and getattr(self, key) is None:
                 raise ValueError(f'{key} is required for {self.quantity}; set place = "BEARING" and direction = "y"')
+        if (self.body is None) == (self.quantity == "torque"):
+            what = (
+                'is required for torque; set body = "BODY"'
+                if self.body is None
+                else "applies to torque only; remove it"
+            )
+            raise ValueError(f"body {what}")
         if isinstance(self.direction, tuple) and not any(self.direction):
             raise ValueError("direction = [0, 0, 0]: has no length; set a vector such as [0, 1, 0]")
         if self.full_scale is not None and self.unit is None:
@@ -98,4 +109,9 @@ class MeasurementSection(Section):
             raise ValueError(
                 'set either tacho = { channel = "...", shaft = "..." } or speed = { channel = "...", shaft = "..." }'
             )
+        torques = [name for name, channel in self.channels.items() if channel.quantity == "torque"]
+        if len(torques) > 1:
+            raise ValueError(f"channels {', '.join(torques)} are torques; keep the one that sets the load")
+        if len(torques) == len(self.channels):
+            raise ValueError("no channel is compared; add one of another quantity than torque")
         return self

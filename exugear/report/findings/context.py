@@ -18,6 +18,7 @@ from exugear.results.folder import bodies_folder
 from exugear.results.run_file import FINAL_NAME, PARTIAL_NAME, invalidity_of, load_run
 from exugear.results.spectra.run_spectra import RunSignals, VariantRun, analysed, run_signals
 from exugear.results.spectra.waterfall import order_lines
+from exugear.steady.evaluation.measured_comparison import comparison_hash, load_comparison
 from exugear.steady.steady_file import load_response, settings_of
 from exugear.system.bearings.rolling.rows import BearingError
 from exugear.system.bodies.elastic_body import ElasticBody
@@ -153,10 +154,12 @@ class StoredResults:
     runs: Sequence[VariantRun]
     steady: Sequence[xr.Dataset] = ()
     """Steady-state responses as `exugear.steady.steady_file.load_response` reads them."""
+    measured: Sequence[xr.Dataset] = ()
+    """As `exugear.steady.evaluation.measured_comparison.load_comparison` reads them, with the attributes of a model."""
 
     def __bool__(self) -> bool:
         """Return whether there is anything to report."""
-        return bool(self.tables or self.modes or self.runs or self.steady)
+        return bool(self.tables or self.modes or self.runs or self.steady or self.measured)
 
 
 def stored_models(context: Context) -> StoredResults:
@@ -167,7 +170,7 @@ def stored_models(context: Context) -> StoredResults:
 def with_responses(context: Context, models: StoredResults) -> StoredResults:
     """Add the runs and steady-state responses that belong to the gearbox file; note the others as skipped."""
     runs = list(_stored_runs(context, models.modes))
-    return replace(models, runs=runs, steady=list(_stored_steady(context)))
+    return replace(models, runs=runs, steady=list(_stored_steady(context)), measured=list(_stored_measured(context)))
 
 
 def _stored_steady(context: Context) -> Iterator[xr.Dataset]:
@@ -186,6 +189,32 @@ def _stored_steady(context: Context) -> Iterator[xr.Dataset]:
             yield data
         else:
             context.notes.left_out.append(f"{context.name_of(path)}: {OTHER_INPUT}")
+
+
+def _stored_measured(context: Context) -> Iterator[xr.Dataset]:
+    """Read the comparisons with measured run-ups that belong to the section and to the response of the gearbox file."""
+    for name, section in context.gearbox.case.measurements.items():
+        for path in sorted(context.folder.glob(f"*/*/measured-{name}.nc")):
+            try:
+                data = load_comparison(path)
+                response = load_response(path.with_name(f"{path.stem}-steady.nc"))
+                found = settings_of(response.attrs).hash_with(context.assembled(choice_of(response.attrs)))
+            except FileError as error:
+                context.notes.left_out.append(str(error))
+                continue
+            except (*_UNFIT, ValueError) as error:
+                context.notes.left_out.append(f"{context.name_of(path)}: {error}")
+                continue
+            own = data.attrs
+            if comparison_hash(str(own["recording_sha256"]), section, found) == own["input_hash"]:
+                yield data.assign_attrs({key: response.attrs[key] for key in ("variant", "mesh_model", "inertias")})
+            else:
+                context.notes.left_out.append(f"{context.name_of(path)}: {OTHER_INPUT}")
+        for path in sorted(context.folder.glob(f"at-*/*/*/measured-{name}.nc")):
+            folder = path.parents[2]
+            context.notes.left_out.append(
+                f"{context.name_of(path)}: is at another load; exugear report {shown_path(folder)} shows it"
+            )
 
 
 def _stored_tables(context: Context) -> dict[str, MeshTable]:

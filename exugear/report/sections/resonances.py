@@ -24,6 +24,7 @@ from exugear.report.findings.resonance_list import ListedResonance
 from exugear.report.findings.words import QUANTITIES, figure_text, percentages, rounded_text
 from exugear.report.pictures.speed_diagrams import NUMBERED, CampbellDrawing, campbell_of
 from exugear.report.sections.material import ChartAxis, Curve, Part, ReportData, model_name
+from exugear.report.sections.measured import measured_run_ups
 from exugear.report.sections.run_data import is_found_always
 from exugear.report.web.html import Cell, Figure, Table, render
 from exugear.results.run_file import read_run
@@ -57,7 +58,8 @@ def resonances_section(material: ReportData) -> Part:
         listed = [_of_estimate(material, headline)]
     modes = [(model_name(model), _all_modes(material, model, data)) for model, data in material.results.modes.items()]
     responses = [_response(material, data) for data in material.results.steady]
-    if not (listed or modes or responses):
+    measured = measured_run_ups(material)
+    if not (listed or modes or responses or measured):
         return Part()
     _note_growth(material)
     groups = material.groups
@@ -77,6 +79,7 @@ def resonances_section(material: ReportData) -> Part:
         animated=bool(modes),
         modes=modes,
         responses=responses,
+        measured=measured,
         ratio=MAX_SWEEP_RATIO,
     )
     return Part(html, material.run_data, "Resonances", "ranking")

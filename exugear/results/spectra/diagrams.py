@@ -5,6 +5,7 @@ Functions take spectra of `exugear.results.spectra.waterfall`; they need no disp
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -94,15 +95,22 @@ def plot_waterfalls(
         return finish_figure(figure, path)
 
 
-def draw_waterfall(run: Waterfall, lines: Iterable[OrderLine], ax: Axes | None = None) -> Axes:
-    """Draw a waterfall with order lines, see `exugear.transient.outcome.Run.plot`."""
-    top = float(run.frequency[-1])
-    highest = float(run.level.max())
+def draw_waterfall(
+    run: Waterfall,
+    lines: Iterable[OrderLine],
+    ax: Axes | None = None,
+    *,
+    highest_frequency: float | None = None,
+    quantity: str = TRANSMISSION_ERROR,
+) -> Axes:
+    """Draw a waterfall with order lines, see `exugear.transient.outcome.Run.plot` and `plot_waterfalls`."""
+    top = min(highest_frequency or math.inf, float(run.frequency[-1]))
+    highest = float(run.level[:, run.frequency <= top].max())
     with axes_or_new(ax, 6.0, 4.6) as panel:
         limits = (float(run.speed.max()) / RPM, top), (highest - DYNAMIC_RANGE, highest)
         image = _draw_waterfall(panel, run, tuple(lines), *limits)
         panel.set_ylabel("Frequency / kHz")
-        panel.figure.colorbar(image, ax=panel, label=_level_label(TRANSMISSION_ERROR, run), extend="min", aspect=30)
+        panel.figure.colorbar(image, ax=panel, label=_level_label(quantity, run), extend="min", aspect=30)
         return panel
 
 

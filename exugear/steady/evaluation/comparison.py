@@ -134,6 +134,13 @@ class ComparedCuts(ReprMixin, line=" of {run_up.name!r}: {shape}"):
         return float(np.sqrt(np.mean(found**2))) if found.size else math.nan
 
     @property
+    def deviation_of_shapes(self) -> float:
+        """Root mean square of the differences that count without the mean of each channel, dB, as a fit states it."""
+        differences = zip(self.difference, self.compared, strict=True)
+        found = [own[chosen] - own[chosen].mean() for own, chosen in differences if chosen.any()]
+        return float(np.sqrt(np.mean(np.concatenate(found) ** 2))) if found else math.nan
+
+    @property
     def speed_error(self) -> float:
         """True over measured speed minus 1, by the phases of the orders; NaN if too few amplitudes count.
 

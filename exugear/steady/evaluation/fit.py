@@ -73,6 +73,20 @@ class ParameterFit(ReprMixin):
     """Number of orders of channels."""
     evaluations: int
 
+    @property
+    def changes(self) -> dict[str, float]:
+        """Fitted values by key, to the six significant digits that a changed gearbox file has.
+
+        Raises
+        ------
+        FitError
+            The data do not determine a parameter.
+        """
+        refused = [f"{own.key} is not determined ({own.refusal})" for own in self.parameters if own.refusal]
+        if refused:
+            raise FitError(f"{', '.join(refused)}; fit the others alone, or record a run-up over its resonances")
+        return {own.key: float(f"{own.value:.6g}") for own in self.parameters}
+
     def _line(self) -> str:
         values = ", ".join(f"{own.key} = {own.value:.4g}" for own in self.parameters)
         return f": {values}; {self.before:.2f} to {self.after:.2f} dB (rms)"

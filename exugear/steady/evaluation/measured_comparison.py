@@ -8,15 +8,18 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.sections.measurements import MeasurementSection
 from exugear.gearbox.units import RPM
 from exugear.gearbox.versions import MEASURED
 from exugear.results.findings import Finding
 from exugear.results.order_tracking.foreign_orders import OrderInSpectrum
+from exugear.results.spectra.diagrams import draw_waterfall
+from exugear.results.spectra.waterfall import sweep_matched_window, waterfall
 from exugear.steady.evaluation.comparison import (
     ComparedCuts,
     PeakPair,
@@ -32,6 +35,7 @@ from exugear.steady.evaluation.mistakes import (
     drift_finding,
     foreign_finding,
     level_findings,
+    load_finding,
     measured_foreign_orders,
     recording_findings,
     shift_finding,
@@ -51,7 +55,7 @@ from fe_ste.tools.drawing import (
     new_figure,
 )
 from fe_ste.tools.files import write_table
-from fe_ste.tools.stores import Store
+from fe_ste.tools.stores import Layout, Store, load_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -63,6 +67,16 @@ MOST_DRAWN_ORDERS = 4
 """Maximum number of orders in a diagram: those with the highest measured amplitudes."""
 DRAWN_UNITS = {"m": ("µm", 1e6), "N": ("N", 1.0), "m/s": ("mm/s", 1e3), "m/s2": ("m/s²", 1.0)}
 """Unit of diagrams and tables, and its factor, by SI unit."""
+
+
+_LAYOUT = Layout(
+    "comparison with a measured run-up",
+    MEASURED,
+    dict.fromkeys(("measured", "background", "computed", "steady"), ("channel", "line", "window"))
+    | {"time": ("window",), "speed": ("window",), "order": ("line",), "line": ("line",)}
+    | dict.fromkeys(("channel", "quantity", "where", "unit"), ("channel",)),
+    ("measurement", "recording_sha256", "input_hash", "window", "verdict", "peaks", "foreign_orders", "warnings"),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +105,19 @@ class MeasuredComparison(ReprMixin):
         return f"Comparison with {self.cuts.run_up.name}", {**rows, "peaks": str(len(self.peaks))}
 
     @property
+    def verdict(self) -> str:
+        """How well levels and peaks agree, in one line."""
+        deviation = self.cuts.deviation()
+        if math.isnan(deviation):
+            return f"{self.cuts.run_up.name}: no measured order is above its background"
+        text = f"{self.cuts.run_up.name}: computed levels within {deviation:.2f} dB (rms)"
+        measured_peaks = sum(not math.isnan(peak.measured_speed) for peak in self.peaks)
+        if measured_peaks:
+            text += f", {self.paired} of {measured_peaks} measured peaks found"
+            text += f", speeds {100.0 * self.speed_shift:+.1f} %" if abs(self.speed_shift) > 0.0005 else ""
+        return text
+
+    @property
     def paired(self) -> int:
         """Number of peaks that both sides have."""
         return sum(peak.paired for peak in self.peaks)
@@ -100,27 +127,36 @@ class MeasuredComparison(ReprMixin):
         """Computed over measured speed of resonances minus 1: see `resonance_shift`."""
         return resonance_shift(self.peaks, self.stretch)
 
-    def plot(self, channel: str | None = None, ax: Axes | None = None) -> Axes:
-        """Draw measured and computed order cuts of a channel over the speed, with the band of plausible damping.
+    def plot(
+        self, channel: str | None = None, kind: Literal["cuts", "waterfall"] = "cuts", ax: Axes | None = None
+    ) -> Axes:
+        """Draw a channel: measured and computed order cuts over the speed, or the waterfall of the measurement.
 
-        Orders are those with the highest measured amplitudes. The steady-state response, neither swept nor averaged, is
-        dotted.
+        Cuts are those of the orders with the highest measured amplitudes, with the band of plausible damping. The
+        steady-state response, neither swept nor averaged, is dotted. The waterfall has the axes and order lines of that
+        of a run (`exugear.transient.outcome.Run.plot`).
 
         Parameters
         ----------
         channel : name of the channel; the first one by default
+        kind : ``cuts`` or ``waterfall``
         ax : matplotlib axes; by default new ones, whose ``ax.figure`` can be shown and saved
 
         Raises
         ------
         ValueError
-            There is no such channel.
+            There is no such channel or kind.
         """
+        if kind not in ("cuts", "waterfall"):
+            raise ValueError(f"kind = {kind!r}: must be one of cuts, waterfall")
         names = [own.name for own in self.cuts.run_up.channels]
         if channel is not None and channel not in names:
             raise ValueError(f"channel = {channel!r}: must be one of {', '.join(names)}")
+        place = 0 if channel is None else names.index(channel)
+        if kind == "waterfall":
+            return _draw_waterfall(self.cuts, place, ax)
         with axes_or_new(ax, COLUMN_WIDTHS[2], 4.0) as panel:
-            _draw_channel(panel, self.cuts, 0 if channel is None else names.index(channel))
+            _draw_channel(panel, self.cuts, place)
             panel.set_xlabel("Input speed / rpm")
             panel.legend(ncols=2)
             return panel
@@ -135,6 +171,7 @@ class MeasuredComparison(ReprMixin):
             "window": resolution_text(cuts.run_up),
             "speeds_rpm": [float(cuts.speed.min()) / RPM, float(cuts.speed.max()) / RPM],
             "deviation_dB": _known(cuts.deviation()),
+            "deviation_without_means_dB": _known(cuts.deviation_of_shapes),
             "speed_stretch": self.stretch,
             "speed_shift_percent": 100.0 * self.speed_shift,
             "channels": [
@@ -227,7 +264,10 @@ class MeasuredComparison(ReprMixin):
             "time": (("window",), cuts.time, {"units": "s", "long_name": "centre of the window in the recording"}),
             "speed": (("window",), cuts.speed, {"units": "rad/s", "long_name": "speed of the overall input"}),
             "order": (("line",), [line.order for line in cuts.lines], {"units": "1"}),
-            "unit": (("channel",), np.array([own.unit for own in cuts.run_up.channels], dtype=object), {}),
+        }
+        variables |= {
+            name: (("channel",), np.array([getattr(own, name) for own in cuts.run_up.channels], dtype=object), {})
+            for name in ("quantity", "where", "unit")
         }
         names = {
             "channel": [own.name for own in cuts.run_up.channels],
@@ -240,6 +280,8 @@ class MeasuredComparison(ReprMixin):
             "recording_sha256": cuts.run_up.digest,
             "window": summary["window"],
             "speed_stretch": self.stretch,
+            "verdict": self.verdict,
+            "warnings": json.dumps([own.text for own in self.findings if own.level == "warning"]),
             "peaks": json.dumps(summary["peaks"]),
             "foreign_orders": json.dumps(summary["foreign_orders"]),
         }
@@ -311,6 +353,7 @@ def compare_run_up(
     found: Sequence[Iterator[Finding]] = (
         speed_finding(gearbox, run_up, spectrum),
         recording_findings(run_up),
+        load_finding(run_up),
         band_findings(cuts),
         drift_finding(cuts),
         level_findings(cuts),
@@ -318,7 +361,6 @@ def compare_run_up(
         coverage_finding(cuts),
         shift_finding(resonance_shift(peaks, stretch)),
     )
-    key = [MEASURED, run_up.digest, run_up.section.model_dump(mode="json"), str(response.attrs["input_hash"])]
     return MeasuredComparison(
         cuts=cuts,
         stretch=stretch,
@@ -326,8 +368,25 @@ def compare_run_up(
         foreign=foreign,
         findings=tuple(finding for part in found for finding in part),
         harmonics=int(response.attrs["harmonics"]),
-        input_hash=hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest(),
+        input_hash=comparison_hash(run_up.digest, run_up.section, str(response.attrs["input_hash"])),
     )
+
+
+def comparison_hash(digest: str, section: MeasurementSection, response_hash: str) -> str:
+    """SHA-256 of all that a comparison depends on: recording (its SHA-256), section, and input of the response."""
+    key = [MEASURED, digest, section.model_dump(mode="json"), response_hash]
+    return hashlib.sha256(json.dumps(key, sort_keys=True).encode()).hexdigest()
+
+
+def load_comparison(path: Path) -> xr.Dataset:
+    """Read what `MeasuredComparison.write` wrote.
+
+    Raises
+    ------
+    FileError
+        The file is missing, damaged, or of another version.
+    """
+    return load_dataset(path, _LAYOUT)
 
 
 def _draw_channel(panel: Axes, cuts: ComparedCuts, channel: int) -> None:
@@ -352,6 +411,24 @@ def _draw_channel(panel: Axes, cuts: ComparedCuts, channel: int) -> None:
     panel.yaxis.set_major_formatter("{x:g}")
     panel.set_ylabel(drawable(f"{own.name}: {own.quantity.replace('_', ' ')}, ± {unit}"))
     panel.set_title("solid: measured; dashed: computed, swept; dotted: steady; band: damping", loc="left", fontsize=7.0)
+
+
+def _draw_waterfall(cuts: ComparedCuts, channel: int, ax: Axes | None) -> Axes:
+    """Draw the waterfall of a channel up to 1.1 times the frequency of the highest order, with the compared orders."""
+    run_up = cuts.run_up
+    own, shaft = run_up.channels[channel], run_up.shaft
+    top = max(float(line.frequency(float(shaft.speed.max()))) for line in cuts.lines)
+    span = shaft.angle.size / shaft.rate
+    spectra = waterfall(
+        run_up.values[channel],
+        shaft.speed,
+        shaft.rate,
+        window_length=min(sweep_matched_window(top * (1.0 - shaft.speed.min() / shaft.speed.max()) / span), 0.1 * span),
+        reference=1e-6 if own.unit == "m" else 1.0,
+        unit=own.unit,
+    )
+    quantity = f"{own.name}: {own.quantity.replace('_', ' ')}"
+    return draw_waterfall(spectra, cuts.lines, ax, highest_frequency=1.1 * top, quantity=quantity)
 
 
 def _known(value: float) -> float | None:

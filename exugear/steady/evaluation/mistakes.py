@@ -47,6 +47,8 @@ HIGHEST_DRIFT = 0.18
 """Periods by which an order may drift within a window for an error of its level of 0.2 dB."""
 SHIFTED = 0.01
 """Relative difference of the speeds of resonances from which it is reported."""
+VARYING_LOAD = 1.0
+"""Change of levels by a varying torque from which it is a warning, dB."""
 MOST_NAMED = 5
 """Maximum number of foreign orders that a sentence names."""
 
@@ -91,6 +93,27 @@ def band_findings(cuts: ComparedCuts) -> Iterator[Finding]:
             f"sample at {fastest / USABLE_BAND:.3g} Hz or more",
             rate,
         )
+
+
+def load_finding(run_up: MeasuredRunUp) -> Iterator[Finding]:
+    """Yield the torque of the run-up, how much it varies, and what this changes.
+
+    Forces of a varying mesh stiffness are proportional to the torque, thus levels to its logarithm.
+    """
+    if run_up.torque is None:
+        return
+    body, mean, (low, high) = run_up.torque.body, run_up.torque.mean, run_up.torque.ends
+    text = f"torque of {body}: mean {mean:.4g} N m, {low:.4g} to {high:.4g} N m over the run-up; computed at the mean"
+    if not low * high > 0.0:
+        yield Finding("warning", f"{text}; it changes its sign, so that teeth separate: measure at a steady load", mean)
+        return
+    changes = sorted(20.0 * math.log10(end / mean) for end in (low, high))
+    yield Finding(
+        "warning" if max(map(abs, changes)) > VARYING_LOAD else "note",
+        f"{text}, which changes levels by {-changes[1]:+.2f} to {-changes[0]:+.2f} dB where vibration is proportional "
+        "to the torque",
+        mean,
+    )
 
 
 def speed_finding(gearbox: Gearbox, run_up: MeasuredRunUp, spectrum: OrderSpectrum | None) -> Iterator[Finding]:

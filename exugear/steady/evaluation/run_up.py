@@ -24,6 +24,10 @@ from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.files import file_digest
 
+LOAD_PARTS = 50
+"""Number of equal parts of a run-up whose mean torques are compared."""
+SAME_LOAD = 0.01
+"""Relative difference from the static load up to which the mean torque is not applied: 0.09 dB of a level."""
 LEAST_RANGE = 1.1
 """Lowest ratio of the highest to the lowest speed of a run-up."""
 BEYOND = 0.02
@@ -92,6 +96,28 @@ class MeasuredChannel:
         return np.asarray(vector / (2j * np.pi * frequency) ** turns)
 
 
+@dataclass(frozen=True)
+class MeasuredTorque:
+    """Torque on a body during a run-up, N m, in the sense of the sensor."""
+
+    body: str
+    mean: float
+    ends: tuple[float, float]
+    """Lowest and highest mean of the parts of the run-up."""
+
+    @classmethod
+    def of(cls, body: str, values: Floats) -> MeasuredTorque:
+        """Return the torque of a signal (n,), N m, whose vibration is averaged within `LOAD_PARTS` parts.
+
+        Examples
+        --------
+        >>> MeasuredTorque.of("input", np.linspace(99.0, 101.0, 5000))
+        MeasuredTorque(body='input', mean=100.0, ends=(99.0198..., 100.9801...))
+        """
+        means = [float(part.mean()) for part in np.array_split(values, LOAD_PARTS)]
+        return cls(body, float(values.mean()), (min(means), max(means)))
+
+
 @dataclass(frozen=True, eq=False)
 class MeasuredRunUp(ReprMixin, line=" {name!r}: {values.shape[0]} channels, {shaft!r}"):
     """A recorded run-up in SI units."""
@@ -112,6 +138,8 @@ class MeasuredRunUp(ReprMixin, line=" {name!r}: {values.shape[0]} channels, {sha
     """(channels, n) signals without their means, SI, at the samples of `shaft`."""
     clipped: dict[str, float]
     """Fraction of samples at the limits, by channel."""
+    torque: MeasuredTorque | None = None
+    """None without a channel of the torque."""
 
     @property
     def window(self) -> AngleWindow:
@@ -170,10 +198,13 @@ def read_run_up(gearbox: Gearbox, name: str | None = None) -> MeasuredRunUp:
             f"over at least {100.0 * (LEAST_RANGE - 1.0):.0f} % is required"
         )
     part = slice(shaft.first, shaft.first + shaft.angle.size)
-    values = []
+    values, torque = [], None
     for own, channel in section.channels.items():
         recorded = recording.channel(files[own])
         factor = _factor(gearbox, f"{key}.channels.{own}", channel, recorded)
+        if channel.body is not None:
+            torque = MeasuredTorque.of(channel.body, factor * recorded.values[part])
+            continue
         if not np.ptp(recorded.values[part]) > 0.0:
             raise gearbox.error(
                 f"{key}.channels.{own}: channel {recorded.name!r} is constant ({recorded.values[part][0]:g}); connect "
@@ -188,10 +219,39 @@ def read_run_up(gearbox: Gearbox, name: str | None = None) -> MeasuredRunUp:
         shaft=shaft,
         per=per,
         speed_shaft=source.shaft,
-        channels=tuple(_measured(own, channel) for own, channel in section.channels.items()),
+        channels=tuple(
+            _measured(own, channel) for own, channel in section.channels.items() if channel.quantity != "torque"
+        ),
         values=np.array(values),
         clipped={own: recording.channel(files[own]).clipped for own in section.channels},
+        torque=torque,
     )
+
+
+def gearbox_at_torque(gearbox: Gearbox, run_up: MeasuredRunUp) -> Gearbox:
+    """Return the gearbox with its static load scaled to the mean torque of a run-up, or itself if they agree to 1 %.
+
+    The sense of the static load stays, because that of a torque sensor is a convention of the test rig.
+
+    Raises
+    ------
+    GearboxFileError
+        The static load has no torque on the body, or the mean torque is zero.
+    """
+    if run_up.torque is None:
+        return gearbox
+    own = next(own for own, section in run_up.section.channels.items() if section.body is not None)
+    key, body, static = f"measurements.{run_up.name}.channels.{own}", run_up.torque.body, gearbox.train.static_torques
+    if not static.get(body):
+        known = ", ".join(name for name, torque in static.items() if torque)
+        raise gearbox.error(f"{key}.body = {body!r}: the static load has no torque on it; name one of {known}")
+    factor = abs(run_up.torque.mean / static[body])
+    if not factor > 0.0:
+        raise gearbox.error(f"{key}: the mean torque is zero; connect its sensor, or remove the channel")
+    if abs(factor - 1.0) <= SAME_LOAD:
+        return gearbox
+    torques = gearbox.case.static_load.torques_N_m
+    return gearbox.varied({"static_load.torques_N_m": {name: factor * own for name, own in torques.items()}})
 
 
 def response_settings(gearbox: Gearbox, run_up: MeasuredRunUp, method: Method = "parametric") -> SteadySettings:

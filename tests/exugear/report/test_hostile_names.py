@@ -152,7 +152,7 @@ def test_no_name_breaks_out_of_a_page(results: tuple[Path, list[Any]], name: str
     assert not re.search("[<>&]", found.texts["data"])
 
 
-EMPTY_LIST: dict[str, Any] = {"listed": [], "animated": False, "modes": [], "responses": []}
+EMPTY_LIST: dict[str, Any] = {"listed": [], "animated": False, "modes": [], "responses": [], "measured": []}
 NO_GEARS = {"errors": Table([]), "gears": Table([])}
 
 
@@ -162,9 +162,12 @@ def test_pieces_of_a_page_escape_whatever_a_file_holds() -> None:
     )
     waterfall = Figure("waterfall", HTML, HTML, HTML)
     pair = {"title": HTML, "maps": [], "words": HTML, "data_sheet": table}
+    measured = dict.fromkeys(("title", "verdict", "window"), HTML)
+    measured |= {"warnings": [HTML], "charts": [waterfall], "peaks": Table([])}
+    drawn = {"words": HTML, "waterfall": waterfall, "cuts": waterfall, "measured": [measured]}
     pieces = [
         render("table", table=table),
-        render("resonances", **EMPTY_LIST | {"words": HTML, "waterfall": waterfall, "cuts": waterfall}),
+        render("resonances", **EMPTY_LIST | drawn),
         render("mode_page", heading=HTML, modes=table, operation=table, about_resonances=HTML),
         render("gears", **NO_GEARS | {"contacts": table, "scope": HTML, "pairs": [pair]}),
     ]

@@ -198,6 +198,11 @@ def test_packed_values_are_unpacked_and_a_rate_may_be_an_attribute(tmp_path):
     assert recording.channels[0].values == pytest.approx(0.5 * np.arange(100) - 3.0)
 
 
+def test_a_torque_named_t_is_no_time(tmp_path):
+    written.hdf5(tmp_path / "a.h5", {"T": np.arange(100.0), "left": np.arange(100.0)}, 100.0, {"T": "N m", "left": "g"})
+    assert [channel.name for channel in read_recording(tmp_path / "a.h5").channels] == ["T", "left"]
+
+
 def test_a_small_file_that_declares_gigabytes_is_refused(tmp_path):
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file.create_dataset("left", shape=(2**34,), dtype="f8", chunks=(2**16,))

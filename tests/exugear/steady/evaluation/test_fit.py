@@ -60,6 +60,8 @@ def test_a_parameter_that_the_data_do_not_determine_is_refused() -> None:
     fit = fit_levels(levels, measured(1, waviness=0.1), chosen, START)
     refusals = {own.key: own.refusal for own in fit.parameters}
     assert refusals["damping"] != ""
+    with pytest.raises(FitError, match="damping is not determined .*; fit the others alone"):
+        _ = fit.changes
 
 
 def test_a_value_at_the_end_of_its_range_is_refused() -> None:
