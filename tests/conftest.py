@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import traceback
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import pytest
@@ -14,13 +15,9 @@ TRACEBACK = "traceback of a command"
 ASKING_TO_STOP = (signal.SIGINT, signal.SIGHUP, signal.SIGTERM, signal.SIGQUIT, signal.SIGPIPE)
 
 
-@pytest.fixture
-def terminal_signals() -> Iterator[None]:
-    """Signals as they come from a terminal, for a test that sends some and for the processes that it starts.
-
-    A shell that starts tests in its background ignores SIGINT for them, `nohup` SIGHUP, and children inherit both.
-    Tests that send signals ask for this; during all others a hangup stays ignored where `nohup` has it so.
-    """
+@contextmanager
+def signals_of_a_terminal() -> Iterator[None]:
+    """Handle signals as they come from a terminal, and let processes that are started meanwhile do so."""
     usual = {signal.SIGINT: signal.default_int_handler, signal.SIGPIPE: signal.SIG_IGN}  # Python's own two
     blocked = signal.pthread_sigmask(signal.SIG_UNBLOCK, ASKING_TO_STOP)
     before = {number: signal.signal(number, usual.get(number, signal.SIG_DFL)) for number in ASKING_TO_STOP}
@@ -30,6 +27,24 @@ def terminal_signals() -> Iterator[None]:
         for number, handler in before.items():
             signal.signal(number, handler)
         signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+
+
+@pytest.fixture
+def terminal_signals() -> Iterator[None]:
+    """Signals as they come from a terminal, for a test that sends some and for the processes that it starts.
+
+    A shell that starts tests in its background ignores SIGINT for them, `nohup` SIGHUP, and children inherit both.
+    Tests that send signals ask for this; during all others a hangup stays ignored where `nohup` has it so.
+    """
+    with signals_of_a_terminal():
+        yield
+
+
+@pytest.fixture(scope="module")
+def terminal_signals_of_module() -> Iterator[None]:
+    """`terminal_signals` for a process that all tests of a file share."""
+    with signals_of_a_terminal():
+        yield
 
 
 @pytest.fixture(autouse=True)
