@@ -187,10 +187,11 @@ def study_design_changes(
             worth = not objection and change.group != ASSUMPTION
             if rated is not None and (worth or change.requirement):
                 changed = _margins(_project_with(project, gearbox, change.name))
+                failed = [NOT_RATED] if changed is None else _failures(rated, changed)
                 if changed is not None:
                     costs.append(margins_in_words(rated.margins, changed.margins))
+                if changed is not None and not failed:
                     remedy = raised_in_words(rated.margins, changed.margins, change.requirement)
-                failed = [NOT_RATED] if changed is None else _failures(rated, changed)
                 objection = objection or (f"fails a requirement: {failed[0]}" if failed else "")
             price = "; ".join(filter(None, costs))
             results.append(ChangeResult(change, effects, price, objection, remedy=remedy))

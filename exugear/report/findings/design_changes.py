@@ -71,7 +71,7 @@ class ChangeResult:
     refusal: str = ""
     """Reason why the change cannot be made."""
     remedy: str = ""
-    """How it raises the margin of the rating that it is to raise; empty if it does not."""
+    """How it raises the margin that it is to raise; empty if it does not, or fails another requirement."""
 
     @property
     def recommended(self) -> bool:
