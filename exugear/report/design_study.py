@@ -190,8 +190,8 @@ def study_design_changes(
                 failed = [NOT_RATED] if changed is None else _failures(rated, changed)
                 if changed is not None:
                     costs.append(margins_in_words(rated.margins, changed.margins))
-                if changed is not None and not failed:
                     remedy = raised_in_words(rated.margins, changed.margins, change.requirement)
+                    remedy += f", but {failed[0]}" if remedy and failed else ""
                 objection = objection or (f"fails a requirement: {failed[0]}" if failed else "")
             price = "; ".join(filter(None, costs))
             results.append(ChangeResult(change, effects, price, objection, remedy=remedy))

@@ -71,7 +71,10 @@ class ChangeResult:
     refusal: str = ""
     """Reason why the change cannot be made."""
     remedy: str = ""
-    """How it raises the margin that it is to raise; empty if it does not, or fails another requirement."""
+    """How it raises the margin that it is to raise; empty if it does not.
+
+    A requirement that it fails, or meets by less than before, is named behind.
+    """
 
     @property
     def recommended(self) -> bool:
