@@ -339,7 +339,7 @@ def response_of(
     is_solved = np.isfinite(points.drive_torque)
     if not is_solved.any():
         raise HarmonicBalanceError(str(points.remark[0]))
-    solved = points.part(is_solved)
+    solved = points if is_solved.all() else points.part(is_solved)
     linear = solver.linear
     frozen = linear.frozen
     explained = []
@@ -402,16 +402,18 @@ def _with_tops(
     tops: KnownTops = {}
     for _ in range(ROUNDS):
         is_solved = np.flatnonzero(np.isfinite(points.drive_torque))
-        solved = points.part(is_solved[np.argsort(points.speed[is_solved], kind="stable")])
-        smooth = np.asarray(~(solved.apart.any(axis=1) | solved.free.any(axis=1)))
-        more = missed_tops(solved.speed, solved.amplitude, smooth, solver.model.quantities, operation, tops)
+        order = is_solved[np.argsort(points.speed[is_solved], kind="stable")]
+        smooth = np.asarray(~(points.apart.any(axis=1) | points.free.any(axis=1)))[order]
+        quantities = solver.model.quantities
+        more = missed_tops(points.speed[order], points.amplitude[order], smooth, quantities, operation, tops)
         if not more.size:
             break
         count = len(points.speed)
         points = points.joined_with(_empty(solver.model, more))
         solve(points, count, lambda: PointSolver(solver.linear, solver.method))
         # A speed that was not requested and has no steady state is dropped without a warning.
-        points = points.part((np.arange(len(points.speed)) < count) | np.isfinite(points.drive_torque))
+        kept = (np.arange(len(points.speed)) < count) | np.isfinite(points.drive_torque)
+        points = points if kept.all() else points.part(kept)
     return points
 
 

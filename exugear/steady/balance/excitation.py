@@ -38,11 +38,11 @@ from exugear.steady.mean_system.mesh_places import (
     MISALIGNMENT,
     POSITION,
     TILT,
+    CycleFunctions,
     Family,
     MeshInterface,
     MeshPlaces,
     Spectra,
-    coupled,
     families,
     group_of,
     mesh_places,
@@ -529,6 +529,24 @@ class HarmonicBalanceModel:
         return found
 
     @cached_property
+    def tangents_beyond_mean(self) -> CycleFunctions:
+        """The same beyond the averaged system, as functions of the mesh cycles."""
+        means = {DEFLECTION: self.waves.mean_stiffness, MISALIGNMENT: self.ring_tilting[:, 0]}
+        spectra = {
+            at: values - _constant(values, means[at[0]]) if at[0] == at[1] else values
+            for at, values in self.cycle_tangents.items()
+        }
+        return self.functions(spectra)
+
+    @cached_property
+    def given(self) -> CycleFunctions:
+        """Forces of tangents at zero deflection over the mesh cycle: of curves, and moments where loads shuttle."""
+        spectra = {(DEFLECTION, DEFLECTION): -self.cycle_pulls}
+        if self.shuttles:
+            spectra[MISALIGNMENT, DEFLECTION] = self.cycle_moments_given
+        return self.functions(spectra)
+
+    @cached_property
     def ring_tilting(self) -> Floats:
         """`MeshWaves.tilting` of each wave's mesh (m, 3)."""
         return np.asarray(self.waves.tilting[[wave.first for wave in self.waves.waves]])
@@ -573,9 +591,9 @@ class HarmonicBalanceModel:
         group = Group(0, len(self.waves.waves), np.concatenate([multiples, -multiples]))
         return lines, HarmonicCoupling(self.lines, (group,))
 
-    def coupled(self, spectra: Spectra, ports: MeshInterface, speed: float) -> list[Complexes]:
-        """Functions of the mesh cycles, by their harmonics, as `coupling` takes them at a speed of the input."""
-        return [coupled(self.waves, family, spectra, ports, speed, ports.forces.shape[1]) for family in self.families]
+    def functions(self, spectra: Spectra) -> CycleFunctions:
+        """Functions of the mesh cycles by their harmonics, which `coupling` takes at a speed of the input."""
+        return CycleFunctions(self.waves, self.families, spectra, self._ports["forces"].shape[2])
 
     @cached_property
     def lengths(self) -> Floats:

@@ -24,7 +24,7 @@ from exugear.steady.balance.excitation import HarmonicBalanceModel, Interface
 from exugear.steady.balance.passing_planets import PassingPlanets
 from exugear.steady.harmonics.linear_solvers import solve_lines
 from exugear.steady.harmonics.lines import add_answered, flat
-from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, POSITION, MeshInterface, Spectra
+from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, POSITION, CycleFunctions, MeshInterface
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.bundles import cached_bundle
 from fe_ste.tools.octets import SIZE
@@ -98,15 +98,15 @@ def transmission_errors(model: HarmonicBalanceModel, ports: MeshInterface, speed
     compliances, ways = (_varying(own) for own in (model.cycle_compliances, model.cycle_ways))
     spectra = {(DEFLECTION, DEFLECTION): -mean * compliances}
     # What the errors go with: force, and misalignment.
-    static = np.zeros((len(model.lines.index), *ports.forces.shape[:2]), dtype=complex)
-    static[0, :, DEFLECTION] = mean[:, 0] * model.pressed(ports.static)
+    static = np.zeros(ports.forces.shape[:2])
+    static[:, DEFLECTION] = mean[:, 0] * model.pressed(ports.static)
     if model.shuttles:
-        static[0, :, MISALIGNMENT] = ports.static[: len(mean), MISALIGNMENT]
+        static[:, MISALIGNMENT] = ports.static[: len(mean), MISALIGNMENT]
         spectra |= {(DEFLECTION, MISALIGNMENT): -mean * ways, (MISALIGNMENT, DEFLECTION): -ways}
-    found = _products(model, spectra, ports, speed, static)
+    found = _products_of_constants(model, model.functions(spectra), ports, speed, static)
     if model.shuttles:
         beyond = {(MISALIGNMENT, DEFLECTION): -_varying(model.cycle_moments_beyond)}
-        found += _products(model, beyond, ports, speed, _everywhere(model, found.shape))
+        found += _products_of_constants(model, model.functions(beyond), ports, speed, _everywhere(model, ports))
     found[0] = 0.0
     return found
 
@@ -127,7 +127,7 @@ def deviation_forces(model: HarmonicBalanceModel, interface: Interface) -> Compl
     errors = forces.copy()
     errors[..., DEFLECTION] = model.deviations(interface.speed)
     forces[..., DEFLECTION] = mean_deviation_forces(model, interface.speed)
-    beyond = _slopes_beyond_mean(model, interface)
+    beyond = model.tangents_beyond_mean.at(ports, interface.speed)
     return forces - model.coupling.of(beyond, errors.reshape(len(errors), -1)).reshape(forces.shape)
 
 
@@ -145,10 +145,10 @@ def forces_of_positions(model: HarmonicBalanceModel, response: Response) -> Comp
     deflection = np.zeros(shape, dtype=complex)
     deflection[..., DEFLECTION] = response.deflection - model.deviations(speed)
     slopes = {(DEFLECTION, DEFLECTION): derivative * model.cycle_coefficients}
-    changes = _products(model, slopes, ports, speed, deflection)
+    changes = _products(model, model.functions(slopes), ports, speed, deflection)
     if waves.loads.any():
         pulls = {(DEFLECTION, DEFLECTION): -derivative * model.cycle_pulls}
-        changes += _products(model, pulls, ports, speed, _everywhere(model, shape))
+        changes += _products_of_constants(model, model.functions(pulls), ports, speed, _everywhere(model, ports))
     lines, coupling = model.slow_shifts
     positions = response.motion[lines] @ np.ascontiguousarray(ports.readings[: shape[1], POSITION].T)
     if (2.0 * np.abs(positions)).sum(axis=0).max(initial=0.0) > LARGEST_SHIFT:
@@ -166,10 +166,10 @@ def forces_of_positions(model: HarmonicBalanceModel, response: Response) -> Comp
     return forces
 
 
-def _everywhere(model: HarmonicBalanceModel, shape: tuple[int, ...]) -> Complexes:
-    """Values (n, m, f) of one at all times in all places: what these have alike is what the mean wave has."""
-    ones = np.zeros(shape, dtype=complex)
-    ones[0, :, DEFLECTION] = [wave.wave == 0 for wave in model.waves.waves]
+def _everywhere(model: HarmonicBalanceModel, ports: MeshInterface) -> Floats:
+    """Constants (m, f) of one in all places: what these have alike is what the mean wave has."""
+    ones = np.zeros(ports.forces.shape[:2])
+    ones[:, DEFLECTION] = [wave.wave == 0 for wave in model.waves.waves]
     return ones
 
 
@@ -179,13 +179,21 @@ def _varying(cycle: Complexes) -> Complexes:
 
 
 def _products(
-    model: HarmonicBalanceModel, spectra: Spectra, ports: MeshInterface, speed: float, values: Complexes
+    model: HarmonicBalanceModel, functions: CycleFunctions, ports: MeshInterface, speed: float, values: Complexes
 ) -> Complexes:
     """Products (n, m, f) of values (n, m, f) with functions of the mesh cycles."""
     if not values.size:  # a train without meshes
         return values
-    functions = model.coupled(spectra, ports, speed)
-    return model.coupling.of(functions, values.reshape(len(values), -1)).reshape(values.shape)
+    return model.coupling.of(functions.at(ports, speed), values.reshape(len(values), -1)).reshape(values.shape)
+
+
+def _products_of_constants(
+    model: HarmonicBalanceModel, functions: CycleFunctions, ports: MeshInterface, speed: float, values: Floats
+) -> Complexes:
+    """Products (n, m, f) of constants (m, f) with functions of the mesh cycles."""
+    if not values.size:  # a train without meshes
+        return np.zeros((len(model.lines.index), *values.shape), dtype=complex)
+    return model.coupling.of_constants(functions.at(ports, speed), values.ravel()).reshape(-1, *values.shape)
 
 
 def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Response:
@@ -240,7 +248,7 @@ class LineBalance:
         answers: Complexes,
         passing: PassingPlanets | None = None,
     ) -> None:
-        functions = _slopes_beyond_mean(model, interface)
+        functions = model.tangents_beyond_mean.at(interface.ports, interface.speed)
         lengths = model.lengths[: interface.ports.forces.shape[0], : interface.ports.forces.shape[1]].ravel()
         self._coupling = model.coupling
         self._functions = [
@@ -289,20 +297,6 @@ def at_mean_positions(model: HarmonicBalanceModel, interface: Interface, respons
     return replace(interface, ports=replace(ports, positions=positions, static=static))
 
 
-def _slopes_beyond_mean(model: HarmonicBalanceModel, interface: Interface) -> list[Complexes]:
-    """Return the slopes of the forces along a row beyond the averaged system, like `HarmonicBalanceModel.coupled`."""
-    functions = model.coupled(model.cycle_tangents, interface.ports, interface.speed)
-    forces = interface.ports.forces.shape[1]
-    for group, function in zip(model.coupling.groups, functions, strict=True):
-        mean = np.flatnonzero(~group.harmonics.any(axis=1))[0]
-        at = np.arange(DEFLECTION, group.size, forces)
-        waves = (group.begin + at) // forces
-        function[mean, at, at] -= model.waves.mean_stiffness[waves]
-        if model.shuttles:
-            function[mean, at + MISALIGNMENT, at + MISALIGNMENT] -= model.ring_tilting[waves, 0]
-    return functions
-
-
 def given_forces(model: HarmonicBalanceModel, interface: Interface) -> Complexes:
     """Return the forces (n, m, f) of tangents at zero deflection in addition to the averaged system: of curves only."""
     waves = model.waves
@@ -310,10 +304,7 @@ def given_forces(model: HarmonicBalanceModel, interface: Interface) -> Complexes
     shape = len(model.lines.index), *ports.forces.shape[:2]
     if not (waves.loads.any() or model.shuttles):
         return np.zeros(shape, dtype=complex)
-    spectra = {(DEFLECTION, DEFLECTION): -model.cycle_pulls}
-    if model.shuttles:
-        spectra[MISALIGNMENT, DEFLECTION] = model.cycle_moments_given
-    products = _products(model, spectra, ports, interface.speed, _everywhere(model, shape))
+    products = _products_of_constants(model, model.given, ports, interface.speed, _everywhere(model, ports))
     products[0, :, DEFLECTION] += waves.mean_stiffness * waves.rest
     if model.shuttles:
         products[0, :, MISALIGNMENT] += model.ring_tilting[:, 2] * [wave.wave == 0 for wave in waves.waves]
