@@ -84,10 +84,12 @@ def check_radiating_body(project: Project) -> None:
 def steady(project: WatchedProject, settings: SteadySettings, quantity: str | None, as_json: bool, whole: bool) -> None:
     """Compute, store and print the response of a project."""
     gearbox = project.gearbox
+    variant = project.choice.variant
     # A variant without steady-state response is refused before tables and finite elements are computed.
-    with suppress(FailedError):  # such a failure does not apply to the selected mesh model
-        if reason := steady_lack(assembled_by_iso(gearbox, project.choice.variant), project.choice.variant):
-            raise BadInputError(reason)
+    if variant.is_elastic or not all(request.stored for request in project.missing_tables()):
+        with suppress(FailedError):  # such a failure does not apply to the selected mesh model
+            if reason := steady_lack(assembled_by_iso(gearbox, variant), variant):
+                raise BadInputError(reason)
     if quantity == "sound_power":
         check_radiating_body(project)
     check_friction(gearbox, project.choice.mesh_model)
