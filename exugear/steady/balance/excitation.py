@@ -531,12 +531,12 @@ class HarmonicBalanceModel:
     @cached_property
     def tangents_beyond_mean(self) -> CycleFunctions:
         """The same beyond the averaged system, as functions of the mesh cycles."""
-        means = {DEFLECTION: self.waves.mean_stiffness, MISALIGNMENT: self.ring_tilting[:, 0]}
-        spectra = {
-            at: values - _constant(values, means[at[0]]) if at[0] == at[1] else values
-            for at, values in self.cycle_tangents.items()
-        }
-        return self.functions(spectra)
+        forces = self._ports["forces"].shape[2]
+        means = np.zeros((len(self.waves.waves), forces))
+        means[:, DEFLECTION] = self.waves.mean_stiffness
+        if self.shuttles:
+            means[:, MISALIGNMENT] = self.ring_tilting[:, 0]
+        return CycleFunctions(self.waves, self.families, self.cycle_tangents, forces, means)
 
     @cached_property
     def given(self) -> CycleFunctions:

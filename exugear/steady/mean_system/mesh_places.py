@@ -267,10 +267,15 @@ class CycleFunctions:
     ----------
     spectra : harmonics of the functions
     forces : number of forces, and of readings, of each wave
+    means : (m, forces), optional
+        What is subtracted from the mean that a wave has with itself, by its first wave.
     """
 
-    def __init__(self, waves: MeshWaves, kinds: Sequence[Family], spectra: Spectra, forces: int) -> None:
+    def __init__(
+        self, waves: MeshWaves, kinds: Sequence[Family], spectra: Spectra, forces: int, means: Floats | None = None
+    ) -> None:
         self._forces = forces
+        self._means = None if means is None else [np.tile(means[own.first], own.count) for own in kinds]
         self._by_place = bool(waves.carriers)
         self._families = [(family, waves.waves[family.first].sense) for family in kinds]
         self._spectra = []
@@ -297,6 +302,8 @@ class CycleFunctions:
                 turns = functions.reshape(len(spectrum), -1, *functions.shape[1:])
                 functions = turns[:, ::-1].conj().reshape(functions.shape)
             found.append(functions)
+        for functions, means in zip(found, self._means or (), strict=False):
+            np.einsum("ii->i", functions[len(functions) // 2])[...] -= means
         return found
 
     def _by_waves(self, family: Family, of_waves: Complexes, ports: MeshInterface) -> Complexes:
