@@ -315,7 +315,8 @@ class Project(ReprMixin):
         progress : called with the number of finished speeds and the total
         """
         # Kernels that a run does not need
-        from exugear.steady.mean_system.mean_system import SteadyError, unsuitable
+        from exugear.steady.mean_system.mean_system import unsuitable
+        from exugear.steady.mean_system.planet_sets import SteadyError
         from exugear.steady.steady_file import stored_or_computed
 
         settings = settings or SteadySettings(usual_speeds(self.gearbox))

@@ -243,6 +243,10 @@ class Layout:
     attributes: tuple[str, ...] = ()
     """Required attributes; others are permitted."""
 
+    def check_dataset(self, dataset: xr.Dataset, path: Path) -> None:
+        """Refuse a dataset of another kind or version, as `check` does."""
+        self.check({str(name): own.dims for name, own in dataset.variables.items()}, dataset.attrs, path)
+
     def check(self, present: Mapping[str, tuple[Hashable, ...]], attributes: Mapping[Any, Any], path: Path) -> None:
         """Refuse a file of another kind or version, by the dimensions of its variables and its attributes.
 
@@ -285,7 +289,7 @@ def open_dataset(path: Path, layout: Layout) -> Iterator[xr.Dataset]:
         except Exception as error:
             raise FileError(f"{path}: is not a netCDF file ({error})") from error
         with dataset:
-            layout.check({str(name): own.dims for name, own in dataset.variables.items()}, dataset.attrs, path)
+            layout.check_dataset(dataset, path)
             yield dataset
 
 

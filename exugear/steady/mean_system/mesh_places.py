@@ -310,11 +310,11 @@ class CycleFunctions:
         """Functions of each wave with itself, and of the mean wave to others."""
         harmonics = len(of_waves) // 2
         orders = 2j * math.pi * np.arange(-harmonics, harmonics + 1)[:, None, None]
-        ahead = np.zeros((family.count, self._forces, family.count, self._forces))
+        ahead: Floats = np.zeros((family.count, self._forces, family.count, self._forces))
         for force in range(self._forces):
             ahead[:, force, 0, force] = ports.static[family.waves, POSITION]
-        ahead = ahead.reshape(of_waves.shape[1:])
-        return np.asarray(np.exp(orders * ports.positions[family.first]) * (of_waves + orders * (of_waves @ ahead)))
+        to_others = of_waves @ ahead.reshape(of_waves.shape[1:])
+        return np.asarray(np.exp(orders * ports.positions[family.first]) * (of_waves + orders * to_others))
 
     def _by_places(self, family: Family, spectrum: Complexes, ports: MeshInterface, speed: float) -> Complexes:
         """Functions by all places, each as far ahead as in the static state, with multiples of the carrier's angle."""
