@@ -85,6 +85,9 @@ class LoadResponse:
     """(n, size) motion under them."""
     torque: float
     """Mean torque of the drive that overcomes them, N m."""
+    at_mean_angles: bool = False
+    """Whether stated loads are at the angles of the mean speed because they did not settle at those that the vibration
+    gives their bodies."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,11 +12,16 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.templates.kinds import template
 from exugear.steady.balance.response import signals
+from exugear.steady.findings import response_findings
 from exugear.steady.point_solver import PointSolver
+from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.steady.steady_file import to_dataset
+from exugear.steady.steady_response import response_of
 from exugear.system.build import assemble
 from exugear.system.modal_damping import with_damping_times
 from exugear.system.system import Assembly
 
+from ..cases import gear_trains
 from ..cases import table as table_case
 from ..cases.assembled import assembled
 from ..cases.bearing import BEARING_CASE, NON_LINEAR
@@ -186,6 +191,37 @@ def test_teeth_that_part_under_a_ripple_stay_on_their_steady_state():
     assert own < 1e-3
     assert every < 2e-3
     assert amplitudes < 1e-3
+
+
+@pytest.mark.parametrize("variant", ["rigid", "bushing"])
+def test_a_torque_on_the_sun_of_a_planetary_stage_with_tables_stays_on_its_steady_state(variant):
+    """Method `nonlinear`: tables of sun and ring, order 5 of the sun, 2 % of the torque, carrier locked; RK4."""
+    content = gear_trains.planetary("ring")
+    content["excitations"] = {"ripple": {"body": "sun", "orders": [5], "torque_N_m": [2.0]}}
+    gearbox = Gearbox.from_dict(content)
+    names = ("sun_planet", "planet_ring")
+    tables = {name: table_case.surface_of(gearbox, name, stiffness=3e8, variation=0.5) for name in names}
+    assembly = assemble(gearbox, Choice(variant, "table"), tables)
+    solver = solver_of(assembly, (50.0, 150.0), "nonlinear", 8)
+    own, every, amplitudes = differences(assembly, solver, 80.0, 5.0, 0.6, 1.0 / 120e3)
+    assert own < 1e-3
+    assert every < 2e-3
+    assert amplitudes < 1e-3
+
+
+def test_speeds_at_which_loads_do_not_settle_are_told():
+    """A torque of 20 N m once per revolution turns the free pair too far at 5 rad/s, and does not at 100 rad/s."""
+    assembly, _ = pair({"orders": [1], "torque_N_m": [20.0]})
+    speeds = SpeedRange(5.0, 100.0, 2)
+    data = to_dataset(response_of(assembly, SteadySettings(speeds, "nonlinear", at_resonances=False)))
+    assert data["speed"].values.tolist() == [5.0, 100.0]
+    assert data["loads_at_mean_angles"].values.tolist() == [1, 0]
+    (told,) = [own.text for own in response_findings(data) if "mean speed" in own.text]
+    assert told.startswith("excitations at the angles of the mean speed, without the vibration, at 47.7 rpm: they turn")
+    assembly, _ = pair({"orders": [1], "torque_N_m": [0.1]})
+    data = to_dataset(response_of(assembly, SteadySettings(speeds, "nonlinear", at_resonances=False)))
+    assert not data["loads_at_mean_angles"].any()
+    assert not any("mean speed" in own.text for own in response_findings(data))
 
 
 def test_a_torque_moves_rolling_bearings_evaluated_in_time_as_in_a_run():
