@@ -78,11 +78,11 @@ def absorber(order: int = 4) -> dict[str, Any]:
     )
 
 
-def test_a_tuned_absorber_responds_as_den_hartog_prints():
-    """J. P. Den Hartog, Mechanical Vibrations, 4th ed. (1956), section 3.2, undamped absorber with k / K = 1 / 5.
+def test_a_tuned_absorber_responds_by_the_formula_of_den_hartog():
+    """J. P. Den Hartog, Mechanical Vibrations, 4th ed. (1956), chapter 3, undamped absorber with k / K = 1 / 5.
 
     x_1 / x_st = (1 - g^2) / ((1 - g^2) (1 + 1/5 - g^2) - 1/5) and x_2 / x_st = 1 / (the same) with g = w / w_a. At
-    g = 1 the main mass stands still, and the absorber moves by -T / k. Resonances are printed at 0.80 and 1.25.
+    g = 1 the main mass stands still, and the absorber moves by -T / k. Resonances are the roots of the denominator.
     """
     content = absorber()
     content["static_load"]["torques_N_m"] = {"flywheel": 1e-9}  # no twist that changes phases
@@ -96,7 +96,6 @@ def test_a_tuned_absorber_responds_as_den_hartog_prints():
         assert found["body_speed absorber"] == pytest.approx(1j * w * static / below, rel=1e-6)
         assert found["coupling_torque tuned"] == pytest.approx(2e3 * static * g**2 / below, rel=1e-6)
     frequencies = np.sort(own.model.system.eigenvalues(25.0).imag)[-2:] / 100.0
-    assert frequencies == pytest.approx([0.80, 1.25], abs=5e-3)
     assert frequencies == pytest.approx(np.sqrt(1.1 + np.array([-1.0, 1.0]) * np.sqrt(0.21)), rel=1e-6)
 
 
