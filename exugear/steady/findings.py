@@ -152,6 +152,13 @@ def _models(data: xr.Dataset) -> Iterator[Finding]:
         text += f"{100.0 * pull.share:.2g} % of the time at {_rpm(pull.speed)}; amplitudes there are invalid, because "
         text += f"the model {model} neglects contact loss; use {_in_time(data, ' --mesh-model table')}"
         yield Finding("warning", text, pull.share)
+    turned = any(str(name).startswith("rotation of ") for name in data["base"].values)
+    waves = any(str(name).endswith(" cosine") for name in data["mesh_wave"].values)
+    if LAWS[model].loses_contact and turned and waves and str(data.attrs["variant"]) != "rigid":
+        text = "planets count at their mean under excitations: what unequal load sharing adds as they pass is left out "
+        text += "(2 % of the orders of the GRC off resonances); leave the excitations out (--without NAME) to see its "
+        text += "size, or use exugear run"
+        yield Finding("warning", text)
     apart = float(np.max(np.nan_to_num(data["contact_loss_fraction"].to_numpy()), initial=0.0))
     if apart > 0.0:
         text = f"contact loss for up to {100.0 * apart:.2g} % of the time (included in the mesh model)"

@@ -193,20 +193,32 @@ def test_teeth_that_part_under_a_ripple_stay_on_their_steady_state():
     assert amplitudes < 1e-3
 
 
-@pytest.mark.parametrize("variant", ["rigid", "bushing"])
-def test_a_torque_on_the_sun_of_a_planetary_stage_with_tables_stays_on_its_steady_state(variant):
-    """Method `nonlinear`: tables of sun and ring, order 5 of the sun, 2 % of the torque, carrier locked; RK4."""
+def planetary(variant: str) -> Assembly:
+    """Planetary stage with tables of sun and ring, and order 5 of the sun, 2 % of its torque; carrier locked."""
     content = gear_trains.planetary("ring")
     content["excitations"] = {"ripple": {"body": "sun", "orders": [5], "torque_N_m": [2.0]}}
     gearbox = Gearbox.from_dict(content)
     names = ("sun_planet", "planet_ring")
     tables = {name: table_case.surface_of(gearbox, name, stiffness=3e8, variation=0.5) for name in names}
-    assembly = assemble(gearbox, Choice(variant, "table"), tables)
+    return assemble(gearbox, Choice(variant, "table"), tables)
+
+
+@pytest.mark.parametrize("variant", ["rigid", "bushing"])
+def test_a_torque_on_the_sun_of_a_planetary_stage_with_tables_stays_on_its_steady_state(variant):
+    """Method `nonlinear`, RK4 at 1/120 kHz."""
+    assembly = planetary(variant)
     solver = solver_of(assembly, (50.0, 150.0), "nonlinear", 8)
     own, every, amplitudes = differences(assembly, solver, 80.0, 5.0, 0.6, 1.0 / 120e3)
     assert own < 1e-3
     assert every < 2e-3
     assert amplitudes < 1e-3
+
+
+@pytest.mark.parametrize(("variant", "told"), [("rigid", False), ("bushing", True)])
+def test_planets_at_their_mean_under_excitations_are_told_where_they_could_bear_unequally(variant, told):
+    settings = SteadySettings(SpeedRange(80.0, 90.0, 2), "nonlinear", at_resonances=False)
+    findings = response_findings(to_dataset(response_of(planetary(variant), settings)))
+    assert any("planets count at their mean under excitations" in own.text for own in findings) == told
 
 
 def test_speeds_at_which_loads_do_not_settle_are_told():
