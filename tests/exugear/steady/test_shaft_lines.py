@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 from typer.testing import CliRunner
 
 from exugear.cli.app import app
@@ -23,6 +24,7 @@ from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import to_dataset, with_names
 from exugear.steady.steady_response import response_of
 from exugear.studies.quantities import QUANTITIES, outputs_of
+from exugear.studies.study import errors_of_signals
 from exugear.system.build import assemble
 from exugear.transient.runup import simulate
 
@@ -182,6 +184,29 @@ def test_studies_have_torques_of_couplings_and_fluctuations_of_speeds_by_their_n
     assert outputs["torque"].of(results) == pytest.approx(torque.max(), rel=1e-6)
     assert outputs["speed"].units == "rad/s"
     assert outputs["speed"].of(results) == pytest.approx((torque / (w * 80.0)).max(), rel=1e-6)
+
+
+def test_studies_accept_signals_and_orders_of_shafts_and_refuse_others():
+    """Before any point is computed; a run gives the part of a signal that is named."""
+    gearbox = Gearbox.from_dict(ship())
+
+    def output(**options: Any) -> dict[str, Any]:
+        return dict(outputs_of({"own": options}, QUANTITIES))
+
+    def errors(**options: Any) -> list[str]:
+        return list(errors_of_signals(output(**options), gearbox, Choice("rigid")))
+
+    line = {"quantity": "largest_line", "signal": "coupling_torque shaft"}
+    assert errors(**line, line="3 x rotation of engine") == []
+    assert "no such order" in errors(**line, line="3 x rotation of motor")[0]
+    assert errors(quantity="rms", signal="coupling_torque shaft") == errors(quantity="rms", signal="body_speed") == []
+    assert "no such signal; there are" in errors(quantity="rms", signal="coupling_torque shift")[0]
+    speeds = np.stack([np.sin(np.arange(1000.0)), 3.0 * np.sin(np.arange(1000.0))], axis=1)
+    run = xr.Dataset({"body_speed": (("time", "body"), speeds)}, {"body": ["engine", "propeller"]})
+    results: Any = SimpleNamespace(run=run)
+    one, largest = (output(quantity="rms", signal=name)["own"] for name in ("body_speed engine", "body_speed"))
+    assert largest.of(results) == pytest.approx(3.0 * one.of(results), rel=1e-12)
+    assert one.units == "rad/s"
 
 
 def test_a_shaft_line_has_a_ranking_and_a_report_and_refuses_what_needs_meshes(tmp_path: Path, monkeypatch):
