@@ -85,6 +85,9 @@ class LoadResponse:
     """(n, size) motion under them."""
     torque: float
     """Mean torque of the drive that overcomes them, N m."""
+    at_mean_angles: bool = False
+    """Whether stated loads are at the angles of the mean speed because they did not settle at those that the vibration
+    gives their bodies."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -537,6 +540,21 @@ class HarmonicBalanceModel:
         if self.shuttles:
             means[:, MISALIGNMENT] = self.ring_tilting[:, 0]
         return CycleFunctions(self.waves, self.families, self.cycle_tangents, forces, means)
+
+    @cached_property
+    def slopes_over_cycle(self) -> CycleFunctions:
+        """Derivative of the tangents by the position, N/m per cycle."""
+        return self.functions({(DEFLECTION, DEFLECTION): self._derivative * self.cycle_coefficients})
+
+    @cached_property
+    def pulls_over_cycle(self) -> CycleFunctions:
+        """Derivative of the forces that curves have without deflection by the position, N per cycle."""
+        return self.functions({(DEFLECTION, DEFLECTION): -self._derivative * self.cycle_pulls})
+
+    @property
+    def _derivative(self) -> Complexes:
+        """Derivative of harmonics (harmonics + 1,) by the position, 1 per cycle."""
+        return np.asarray(2j * np.pi * np.arange(self.harmonics + 1))
 
     @cached_property
     def given(self) -> CycleFunctions:
