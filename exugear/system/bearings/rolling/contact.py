@@ -91,13 +91,19 @@ def _row_laminae(row: RollerRow, first: int, first_roller_angle: float) -> Lamin
     along = np.tile(slices, row.element_count) * row.effective_length
     cosine = math.cos(row.contact_angle)
     sine = math.sin(row.contact_angle)
-    normal = np.column_stack([cosine * np.cos(polar), cosine * np.sin(polar), np.full(polar.size, sine)])
+    across, upwards = np.cos(polar), np.sin(polar)
+    normal = np.array([cosine * across, cosine * upwards, np.full(polar.size, sine)])
     radius = 0.5 * row.pitch_diameter - along * sine
-    point = np.column_stack([radius * np.cos(polar), radius * np.sin(polar), row.axial_position + along * cosine])
-    if row.aligning:
-        point[:] = 0.0, 0.0, row.sphere_centre  # contact forces pass through the centre of the raceway's sphere
+    point = np.array([radius * across, radius * upwards, row.axial_position + along * cosine])
+    if row.aligning:  # contact forces pass through the centre of the raceway's sphere
+        point[:] = np.array([0.0, 0.0, row.sphere_centre])[:, None]
+    direction = np.empty((polar.size, 6))
+    direction[:, :3] = normal.T
+    direction[:, 3] = point[1] * normal[2] - point[2] * normal[1]
+    direction[:, 4] = point[2] * normal[0] - point[0] * normal[2]
+    direction[:, 5] = point[0] * normal[1] - point[1] * normal[0]
     return LaminaArrays(
-        direction=np.hstack([normal, np.cross(point, normal)]),
+        direction=direction,
         gap=0.5 * row.radial_clearance * cosine + 2.0 * row.drop(along),
         constant=np.full(polar.size, row.contact_constant / row.laminae),
         pressure=np.full(polar.size, _lamina_pressure(row)),
