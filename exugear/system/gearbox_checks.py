@@ -64,7 +64,7 @@ def free_motion(gearbox: Gearbox, variant: str) -> str:
         return "no bearing supports a body"
     # Each row of one length: how stiff a support is does not matter, only that it holds.
     # The triangle has the same singular values and right vectors as the rows, of which there are many more.
-    triangle = np.linalg.qr(rows / np.linalg.norm(rows, axis=1, keepdims=True), mode="r")
+    triangle = np.asarray(np.linalg.qr(rows / np.linalg.norm(rows, axis=1, keepdims=True), mode="r"))
     rolling = _rolling_motions(gearbox, moving, starts)
     singular = np.linalg.svd(triangle, compute_uv=False)
     held = int(np.sum(singular > FREE_STRETCH * singular[0]))

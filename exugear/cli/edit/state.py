@@ -99,6 +99,7 @@ class Analyst:
         self._kept: dict[str, list[dict[str, Any]]] = {}
         self._latest: dict[str, object] = {}
         self._picture: dict[str, Any] = {"geometry": ""}
+        self._assembly: Assembly | None = None
 
     def steps(self, text: str, tab: str = "", geometry: str = "") -> Generator[dict[str, Any]]:
         """Yield the results of a text step by step; a newer request of the same tab ends an older one.
@@ -149,7 +150,7 @@ class Analyst:
                 bodies = rigid_bodies(checked.gearbox)
                 yield self._pictured(bodies, Labels(checked.gearbox).labels)
                 variant = usual_variant(checked.gearbox)
-                assembly = assembled_by_iso(checked.gearbox, variant)
+                self._assembly = assembly = assembled_by_iso(checked.gearbox, variant, self._assembly)
                 modes = modes_of(assembly)
                 warnings = self._warnings([unusual_damping(modes)], text)
                 yield {"step": "dynamics", **dynamics(modes), **motions(modes, bodies), "remarks": warnings}
@@ -272,14 +273,11 @@ def dynamics(modes: Modes) -> dict[str, Any]:
 def loads(assembly: Assembly) -> tuple[dict[str, Any], list[str]]:
     """Return the tables of bearings and meshes under the static load, and warnings about the bearings."""
     state = static_state(assembly) if assembly.variant.has_bearings else None
-    duties = bearing_duties(assembly) if any(bearing.catalogue for bearing in assembly.gearbox.bearings) else ()
-    rows = [
-        {**duty_summary(duty), "key": f"bearings.{duty.family}"}
-        for duty in {duty.family: duty for duty in reversed(duties)}.values()
-    ]
+    duties = bearing_duties(assembly, one_of_a_set=True)
+    rows = [{**duty_summary(duty), "key": f"bearings.{duty.family}"} for duty in duties]
     columns = [column for column in bearings_task.BEARINGS if not column.is_detail]
     tables = {
-        "bearings": table_data(columns, rows[::-1], legend=bearings_task.LEGEND),
+        "bearings": table_data(columns, rows, legend=bearings_task.LEGEND),
         "meshes": table_data(MESHES, _mesh_rows(state) if state else []),
     }
     return tables, [f"bearings.{duty.family}: {remark}" for duty in duties for remark in duty.remarks]

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -269,18 +269,24 @@ class BearingState(ReprMixin):
     """(6,) inner ring relative to outer ring, m and rad."""
     load: Floats
     """(6,) force and moment on the inner ring that hold it there, N and N m."""
-    tangent: Floats
-    """(6, 6) derivative of the load, N/m, N, N m/rad."""
     element_load: Floats
     """(elements,) load of each roller or ball, row by row, N."""
     element_pressure: Floats
     """(elements,) maximum pressure of each on a raceway, Pa."""
     lamina_load: tuple[Floats | None, ...]
     """(elements, laminae) for each row of rollers the load of each lamina, N; None for a row of balls."""
-    energy: float
-    """Elastic energy, J."""
     contacts: RowContacts
     """The contacts, for further evaluation."""
+
+    @cached_property
+    def tangent(self) -> Floats:
+        """Derivative (6, 6) of the load, N/m, N, N m/rad."""
+        return tangent_stiffness(self.contacts, self.displacement)
+
+    @property
+    def energy(self) -> float:
+        """Elastic energy, J."""
+        return elastic_energy(self.contacts, self.displacement)
 
     def _line(self) -> str:
         displacement, load = (
@@ -298,15 +304,13 @@ class BearingState(ReprMixin):
 
 
 def bearing_state(contacts: RowContacts, displacement: Floats) -> BearingState:
-    """Evaluate loads, pressures and tangent of a bearing at a displacement of the inner ring, shape (6,)."""
+    """Evaluate loads and pressures of a bearing at a displacement of the inner ring, shape (6,)."""
     return BearingState(
         displacement=displacement,
         load=bearing_load(contacts, displacement),
-        tangent=tangent_stiffness(contacts, displacement),
         element_load=element_loads(contacts, displacement),
         element_pressure=element_pressures(contacts, displacement),
         lamina_load=loads_of_laminae(contacts, displacement),
-        energy=elastic_energy(contacts, displacement),
         contacts=contacts,
     )
 
