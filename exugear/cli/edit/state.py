@@ -61,7 +61,7 @@ MESHES = (
     Column("mesh force kN", "force_kN", partial(significant, digits=3)),
     Column("misalignment mrad", "misalignment_mrad", ".3f"),
     Column("gap at +z end µm", "opening_um", ".1f"),
-    Column("centre distance µm", "centre_distance_change_um", ".1f"),
+    Column("change of centre distance µm", "centre_distance_change_um", ".1f"),
 )
 MODES = (
     Column("No.", "number"),

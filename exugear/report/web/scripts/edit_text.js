@@ -8,6 +8,18 @@ const HEADER = /^\s*\[\[?\s*([^\]#]+?)\s*\]/;
 const PAIR = /^\s*([\w."'-]+(?:\s*\.\s*[\w."'-]+)*)\s*=/;
 const NUMBER = /(?<![\w."'])[-+]?\d[\d_]*(?:\.\d+)?(?:[eE][-+]?\d+)?(?![\w."'])/g;
 
+/** Beginning of a number with an exponent, of which the mode of CodeMirror takes the part before it. */
+const EXPONENT = /^[-+]?\d[\d_]*(?:\.\d[\d_]*)?[eE][-+]?\d+/;
+
+/** The mode of CodeMirror, with whole numbers. */
+const tomlMode = () => ({
+  ...CM.toml,
+  token: (/** @type {any} */ stream, /** @type {any} */ state) => {
+    if (!state.inString && !state.lhs && stream.match(EXPONENT)) return "number";
+    return CM.toml.token(stream, state);
+  },
+});
+
 /** @param {string} dotted */
 const plainKey = (dotted) => dotted.replace(/["'\s]/g, "");
 
@@ -58,7 +70,7 @@ export function makeEditor(parent, told) {
     CM.closeBrackets(),
     CM.highlightSelectionMatches(),
     CM.search({ top: true }),
-    CM.StreamLanguage.define(CM.toml),
+    CM.StreamLanguage.define(tomlMode()),
     CM.syntaxHighlighting(COLOURS()),
     CM.autocompletion({ override: [completions], icons: false }),
     CM.keymap.of([
@@ -88,6 +100,7 @@ export function putText(editor, text, first = false) {
     changes: { from: 0, to: editor.state.doc.length, insert: text },
     selection: { anchor: Math.min(before, text.length) },
     annotations: CM.Transaction.addToHistory.of(!first),
+    userEvent: "input.replace", // a step of its own for undo
   });
 }
 
