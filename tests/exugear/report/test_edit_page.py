@@ -7,14 +7,13 @@ import shutil
 import signal
 import subprocess
 import sys
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from exugear.cli.edit.server import EditServer
+from exugear.cli.edit.stored import EditedFile, digest_of
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.templates.kinds import template
 from exugear.results.folder import REPORT_FILE, keep_case, note_time
@@ -120,11 +119,17 @@ def process(served: tuple[Path, str, subprocess.Popen[str]]) -> subprocess.Popen
 
 
 @pytest.fixture
-def view(browser: Any, address: str) -> Iterator[EditView]:
+def early_view(browser: Any, address: str) -> Iterator[EditView]:
+    """A page whose results are still being computed."""
     one = EditView(browser, address)
-    one.current()
     yield one
     one.page.context.close()
+
+
+@pytest.fixture
+def view(early_view: EditView) -> EditView:
+    early_view.current()
+    return early_view
 
 
 def test_an_error_is_shown_at_its_line_and_its_correction_is_taken(view: EditView) -> None:
@@ -297,16 +302,10 @@ def test_two_tabs_and_another_editor_do_no_harm(view: EditView, browser: Any, ad
     other.page.context.close()
 
 
-def test_the_second_of_two_servers_cannot_replace_what_the_first_has_saved(
-    view: EditView, browser: Any, case: Path
-) -> None:
-    second = EditServer(case, case.parent / "results")
-    threading.Thread(target=second.serve_forever, daemon=True).start()
-    other = EditView(browser, second.address)
-    other.type_over("modal_percent = 2.0", 3, "3.5")
+def test_the_page_cannot_replace_what_another_server_has_saved(early_view: EditView, case: Path) -> None:
+    view = early_view
     view.type_over("modal_percent = 2.0", 3, "2.5")
-    other.page.click("#save")
-    assert other.soon(lambda: other.text("#saved") == "saved")
+    EditedFile(case, case.parent / "results").save(PAIR.replace("= 2.0", "= 3.5"), digest_of(PAIR))
     view.page.click("#save")
     view.page.wait_for_selector("#conflict:visible")
     assert "modal_percent = 3.5" in case.read_text(encoding="utf-8")
@@ -316,20 +315,17 @@ def test_the_second_of_two_servers_cannot_replace_what_the_first_has_saved(
     view.page.click("#undo")
     view.page.wait_for_selector(".cm-line >> text=modal_percent = 2.5")
     assert view.text("#saved") == "not saved"
-    other.page.context.close()
-    second.shutdown()
-    second.server_close()
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits the files of another process")
 def test_on_a_full_disk_the_file_keeps_its_content_and_the_page_says_so(
-    view: EditView, case: Path, process: subprocess.Popen[str]
+    early_view: EditView, case: Path, process: subprocess.Popen[str]
 ) -> None:
     """A file may not grow beyond a limit: as on a full disk, some of it can be written and the rest cannot."""
     import resource
 
+    view = early_view
     view.type_over("modal_percent = 2.0", 3, "2.5")
-    view.current()
     unlimited = resource.prlimit(process.pid, resource.RLIMIT_FSIZE)
     resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (1000, unlimited[1]))
     try:
@@ -348,11 +344,12 @@ def test_on_a_full_disk_the_file_keeps_its_content_and_the_page_says_so(
     assert not view.page.locator("#not-saved").is_visible()
 
 
-def test_work_that_fails_says_why(view: EditView, case: Path) -> None:
+def test_work_that_fails_says_why(early_view: EditView, case: Path) -> None:
+    view = early_view
     (case.parent / "results").write_text("no folder")
     view.page.get_by_role("button", name="Tables").click()
     assert view.soon(lambda: view.text("#work-words").startswith("Tables: failed after"))
-    assert re.search(r"Bad input: .*results.* is not a folder", view.text("#work-words"))
+    assert re.search(r"s\. Bad input: .*results: .*; specify a folder", view.text("#work-words"))
     (case.parent / "results").unlink()
     assert view.errors == []
 

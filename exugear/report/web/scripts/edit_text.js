@@ -93,12 +93,16 @@ export function makeEditor(parent, told) {
   return new EditorView({ parent, state: CM.EditorState.create({ doc: "", extensions }) });
 }
 
-/** Replace the whole text, which can be undone unless it is the first. @param {Editor} editor @param {string} text @param {boolean} first */
+/** Replace the text where it differs, which can be undone unless it is the first; the cursor stays. @param {Editor} editor @param {string} text @param {boolean} first */
 export function putText(editor, text, first = false) {
-  const before = editor.state.selection.main.head;
+  const before = editor.state.doc.toString();
+  const least = Math.min(before.length, text.length);
+  let from = 0;
+  while (from < least && before[from] === text[from]) from++;
+  let same = 0;
+  while (same < least - from && before[before.length - 1 - same] === text[text.length - 1 - same]) same++;
   editor.dispatch({
-    changes: { from: 0, to: editor.state.doc.length, insert: text },
-    selection: { anchor: Math.min(before, text.length) },
+    changes: { from, to: before.length - same, insert: text.slice(from, text.length - same) },
     annotations: CM.Transaction.addToHistory.of(!first),
     userEvent: "input.replace", // a step of its own for undo
   });
