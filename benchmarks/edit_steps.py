@@ -19,7 +19,7 @@ from pathlib import Path
 
 from timing import CASE, ROOT, environment, median
 
-STEPS = ("check", "picture", "dynamics", "loads")
+STEPS = ("check", "picture", "dynamics", "loads", "shapes")
 CHANGES = 9
 TURNS = 3
 
@@ -42,7 +42,7 @@ def measure() -> dict[str, dict[str, float]]:
             for step in analyst.steps(changed, "", geometry):
                 json.dumps(step)
                 times[step["step"]].append(1e3 * (time.process_time() - begin))
-        found[name] = {step: median(values) for step, values in times.items()}
+        found[name] = {step: median(values) for step, values in times.items() if values}
     return found
 
 
@@ -72,7 +72,8 @@ def main() -> None:
         cells = []
         for step in STEPS:
             own = min(mine[name][step] for mine, _ in turns)
-            ratios = [mine[name][step] / other[name][step] for mine, other in turns if other and name in other]
+            pairs = [(mine[name], other[name]) for mine, other in turns if other and name in other]
+            ratios = [mine[step] / other[step] for mine, other in pairs if step in other]
             cells.append(f"{own:.0f}" + (f" ({median(ratios):.2f})" if ratios else ""))
         print(f"| {name} | " + " | ".join(cells) + " |")
 

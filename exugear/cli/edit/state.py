@@ -1,4 +1,4 @@
-"""Results of the text of a gearbox file, step by step: errors and kinematics, picture, modes, static loads.
+"""Results of the text of a gearbox file, step by step: errors, kinematics, picture, modes, static loads, shapes.
 
 Mesh stiffness is that of ISO 6336-1 and bodies are rigid, so that no finite elements are needed. Nothing is written.
 """
@@ -112,7 +112,8 @@ class Analyst:
         Yields
         ------
         dict
-            For JSON, with the key ``step``: ``check``, ``picture``, ``dynamics`` and ``loads``, or ``superseded``.
+            For JSON, with the key ``step``: ``check``, ``picture``, ``dynamics``, ``loads`` and ``shapes``, or
+            ``superseded``.
         """
         request = self.ask(tab)
         digest = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
@@ -153,11 +154,12 @@ class Analyst:
                 self._assembly = assembly = assembled_by_iso(checked.gearbox, variant, self._assembly)
                 modes = modes_of(assembly)
                 warnings = self._warnings([unusual_damping(modes)], text)
-                yield {"step": "dynamics", **dynamics(modes), **motions(modes, bodies), "remarks": warnings}
+                yield {"step": "dynamics", **dynamics(modes), "remarks": warnings}
                 tables, remarks = loads(assembly)
                 unavailable = "" if assembly.variant.has_bearings else lacking(checked.gearbox, Variant.bushing)
                 warnings = self._warnings(remarks, text)
                 yield {"step": "loads", "tables": tables, "unavailable": unavailable, "remarks": warnings}
+                yield {"step": "shapes", "tables": {"modes": _mode_table(modes)}, **motions(modes, bodies)}
         except (BadInputError, FailedError) as error:
             errors = placed(str(error).splitlines(), "error", self._source, text)
             yield {"step": "dynamics", "failed": True, "remarks": [asdict(remark) for remark in errors]}
@@ -257,14 +259,13 @@ def _family(gearbox: Gearbox, name: str) -> str:
 
 
 def dynamics(modes: Modes) -> dict[str, Any]:
-    """Return modes and the Campbell diagram; the mode shown first is that with the largest share within it."""
+    """Return the Campbell diagram; the mode shown first is that with the largest share within it."""
     diagram = modes.campbell()
     inside = diagram.seen[modes.frequency[diagram.seen] <= diagram.top]
     first = inside[np.argmax(modes.overall[inside])] if inside.size else np.argmax(modes.overall)
     return {
         "failed": False,
         "model": f"{modes.assembly.variant}, mesh stiffness to ISO 6336-1, rigid bodies",
-        "tables": {"modes": _mode_table(modes)},
         "campbell": campbell(modes, diagram),
         "first": int(first),
     }

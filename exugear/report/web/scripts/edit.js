@@ -1,6 +1,6 @@
 // The page of the command `edit`: the text, and all that the program makes of it.
 import { find, make, need, say } from "./dom.js";
-import { keyAt, pointOut, setOld, showCampbell, showCheck, showDynamics, showLoads, showPicture, shown, shownGeometry, stepMode, tellVerdict } from "./edit_results.js";
+import { keyAt, pointOut, setOld, showCampbell, showCheck, showDynamics, showLoads, showPicture, showShapes, shown, shownGeometry, stepMode, tellVerdict } from "./edit_results.js";
 import { ask, results } from "./edit_server.js";
 import { beginSlider, followCursor } from "./edit_slider.js";
 import { correct, correctionText, goToKey, goToLine, keyAtCursor, makeEditor, putText, showRemarks } from "./edit_text.js";
@@ -20,7 +20,7 @@ let timer = 0;
 /** Number of the text: results of an earlier one are shown grey. */
 let version = 0;
 /** Results that come one after the other. */
-const STEPS = ["check", "picture", "dynamics", "loads"];
+const STEPS = ["check", "picture", "dynamics", "loads", "shapes"];
 
 const editor = makeEditor(need("text"), { changed: onText, moved: onCursor, save: () => void save() });
 const text = () => editor.state.doc.toString();
@@ -59,8 +59,9 @@ async function compute() {
       for await (const step of results(text(), shownGeometry())) {
         if (step.step === "check") showCheck(step, goTo);
         if (step.step === "picture") await showPicture(step);
-        if (step.step === "dynamics") await showDynamics(step);
+        if (step.step === "dynamics") showDynamics(step);
         if (step.step === "loads") showLoads(step, goTo);
+        if (step.step === "shapes") await showShapes(step);
         if (mine === version) tell(step);
         else setOld(STEPS, true);
         if (again && step.step === "dynamics") break;
@@ -204,7 +205,7 @@ function beginPicking() {
 
 async function begin() {
   beginModeView();
-  need("mode-title").dataset.step = "dynamics";
+  need("mode-title").dataset.step = "shapes";
   beginPicking();
   beginSlider(editor);
   beginTheme(() => (showCampbell(), void drawMode()));
