@@ -52,6 +52,7 @@ from exugear.steady.mean_system.mesh_waves import MeshWaves, mesh_waves
 from exugear.steady.mean_system.shaft_orders import Places, ShaftOrders, at_lines
 from exugear.steady.mean_system.signals import (
     AXES,
+    SUPPORT_MOMENT,
     SURFACE_VELOCITY,
     Quantity,
     SignalName,
@@ -61,6 +62,7 @@ from exugear.steady.mean_system.signals import (
     quantities_of,
     signal_rows,
 )
+from exugear.steady.mean_system.standing_loads import gear_load_rows, moment_supports
 from exugear.steady.mean_system.tooth_friction import tooth_friction
 from exugear.system.kernels.meshes import SPIN_1
 from exugear.system.tooth_mesh.laws.registry import LAWS
@@ -294,6 +296,34 @@ class HarmonicBalanceModel:
         supports = [wave.connectors[wave.wave] for wave in self.bearings.waves]
         first = [signal_name.quantity for signal_name in self.signal_names].index("support_force")
         return np.asarray(first + len(axes) * np.array(supports)[:, None] + axes)
+
+    @cached_property
+    def bearing_moments(self) -> tuple[Integers, Integers]:
+        """Non-linear bearings (k,) on what stands still, and places (k, 2) of their moments among the signals."""
+        if self.bearings is None:
+            return np.zeros(0, dtype=np.int64), np.zeros((0, 2), dtype=np.int64)
+        standing = moment_supports(self.waves.assembly).tolist()
+        supports = [(n, wave.connectors[wave.wave]) for n, wave in enumerate(self.bearings.waves)]
+        found = [(n, standing.index(support)) for n, support in supports if support in standing]
+        bearings, places = np.array(found, dtype=np.int64).reshape(-1, 2).T
+        if not found:
+            return bearings, np.zeros((0, 2), dtype=np.int64)
+        first = [signal_name.quantity for signal_name in self.signal_names].index(SUPPORT_MOMENT)
+        return bearings, np.asarray(first + len(AXES) * places[:, None] + np.arange(2))
+
+    @cached_property
+    def gear_load_rows(self) -> tuple[Floats, Floats]:
+        """Loads of the gears that stand still per unit of each wave's force and moment, (m, 6 gears) each."""
+        return gear_load_rows(self.waves)
+
+    @cached_property
+    def _misalignments(self) -> Floats:
+        rows = self.waves.assembly.meshes.table.misalignment
+        return np.array([self.waves.gradients(rows, float(speed)) for speed in self.system.speeds])
+
+    def misalignments_at(self, speed: float) -> Floats:
+        """Rows (m, size) of the misalignments of the meshes' waves at a speed of the input, rad/s."""
+        return np.asarray(self.system.at(self._misalignments, speed))
 
     def places(self, speed: float, positions: Floats, angles: Floats) -> MeshPlaces:
         """Places where laws are evaluated, as `mesh_places` has them; those of bearings follow."""
