@@ -27,8 +27,9 @@ from exugear.system.bodies.matrix_files.plain import (
 from exugear.system.bodies.matrix_files.punch import punch_content, punch_nodes_content, read_punch
 
 MatrixFormat = Literal["npz", "csv", "mtx", "op4", "dmig"]
-Kind = Literal["stiffness", "mass"]
+Kind = Literal["stiffness", "mass", "gyroscopic"]
 KINDS: tuple[Kind, ...] = ("stiffness", "mass")
+"""Matrices of every body."""
 PUNCH = (".pch", ".bdf", ".dat", ".nas", ".asm")
 """Endings of Nastran punch and bulk data files."""
 ENDINGS = (".npz", ".csv", ".mtx", ".op4", *PUNCH)
@@ -38,6 +39,7 @@ NODE_ENDINGS = (".csv", ".inp", ".npz", *PUNCH)
 NAMES: Mapping[Kind, tuple[str, ...]] = {
     "stiffness": ("KAAX", "KAA", "KXX", "KGG", "K2GG", "K", "STIFF"),
     "mass": ("MAAX", "MAA", "MXX", "MGG", "M2GG", "M", "MASS"),
+    "gyroscopic": ("GAAX", "GYRO", "BAAX", "BAA", "BGG", "B2GG", "G", "D"),
 }
 """Usual names of the matrices in Nastran files, the first ones preferred."""
 WRITTEN_NAMES = {"stiffness": "KAAX", "mass": "MAAX"}
@@ -55,7 +57,10 @@ INSTEAD = {
 
 @dataclass(frozen=True)
 class MatrixFiles:
-    """Files of a body: `file` with both matrices, or one for each; and the nodes, if these have no positions."""
+    """Files of a body: `file` with both matrices, or one for each; and the nodes, if these have no positions.
+
+    A gyroscopic matrix has a file of its own.
+    """
 
     file: Path | None = None
     stiffness: Path | None = None
@@ -63,11 +68,13 @@ class MatrixFiles:
     nodes: Path | None = None
     names: Mapping[Kind, str] | None = None
     """Names of the matrices in Nastran files; by default the first of `NAMES` that is there."""
+    gyroscopic: Path | None = None
 
     @property
     def paths(self) -> tuple[Path, ...]:
         """All files."""
-        return tuple(path for path in (self.file, self.stiffness, self.mass, self.nodes) if path is not None)
+        given = (self.file, self.stiffness, self.mass, self.nodes, self.gyroscopic)
+        return tuple(path for path in given if path is not None)
 
 
 def read_matrices(files: MatrixFiles) -> InterfaceMatrices:
@@ -109,7 +116,11 @@ def read_matrices(files: MatrixFiles) -> InterfaceMatrices:
             f"whose name ends in {', '.join(NODE_ENDINGS)}"
         )
     path, table = tables[0]
-    return interface_matrices(matrices["stiffness"], matrices["mass"], table, path)
+    gyroscopic = None
+    if files.gyroscopic is not None:
+        found, others, _ = _read(files.gyroscopic, frozenset(NAMES["gyroscopic"]))
+        gyroscopic = _chosen(files.gyroscopic, found, others, "gyroscopic", files)
+    return interface_matrices(matrices["stiffness"], matrices["mass"], table, path, gyroscopic)
 
 
 def read_nodes(path: Path) -> NodeTable:
@@ -165,7 +176,7 @@ def _chosen(
     """Choose the stiffness or mass matrix of a file."""
     stated = None if files.names is None else files.names.get(kind)
     candidates = [stated.upper()] if stated is not None else [kind, *NAMES[kind]]
-    if files.file is None:
+    if files.file is None or kind == "gyroscopic":
         candidates.append("matrix")
     name = next((name for name in candidates if name in found), None)
     if name is None and "matrix" in found:
@@ -176,7 +187,8 @@ def _chosen(
         known = ", ".join(others[:20]) or "none"
         named = "" if stated is None else f" named {stated}"
         raise MatrixFileError(
-            f"{path}: no {kind} matrix{named}; matrices are {known}; set {kind}_name to the name of one"
+            f"{path}: no {kind} matrix{named}; matrices are {known}; "
+            + (f"name it {NAMES[kind][0]}" if kind == "gyroscopic" else f"set {kind}_name to the name of one")
         )
     return found[name]
 

@@ -88,6 +88,8 @@ class InterfaceMatrices(ReprMixin, line=": {nodes!n} interface nodes, {modal!n} 
     mass: Floats
     stiffness: Floats
     """(n, n)"""
+    gyroscopic: Floats | None = None
+    """(n, n) antisymmetric G of M q'' + Omega G q' + K q = f, Omega in rad/s about +z, if it is known."""
 
     @property
     def size(self) -> int:
@@ -142,6 +144,7 @@ class InterfaceMatrices(ReprMixin, line=": {nodes!n} interface nodes, {modal!n} 
             positions=self.positions * length,
             mass=self.mass * factors,
             stiffness=self.stiffness * factors / time**2,
+            gyroscopic=None if self.gyroscopic is None else self.gyroscopic * factors,
         )
 
     def moved(self, rotation: Floats, shift: Sequence[float]) -> InterfaceMatrices:
@@ -160,6 +163,7 @@ class InterfaceMatrices(ReprMixin, line=": {nodes!n} interface nodes, {modal!n} 
             positions=self.positions @ rotation.T + np.asarray(shift),
             mass=turned @ self.mass @ turned.T,
             stiffness=turned @ self.stiffness @ turned.T,
+            gyroscopic=None if self.gyroscopic is None else turned @ self.gyroscopic @ turned.T,
         )
 
     def in_order(self, nodes: Sequence[int]) -> InterfaceMatrices:
@@ -172,6 +176,7 @@ class InterfaceMatrices(ReprMixin, line=": {nodes!n} interface nodes, {modal!n} 
             positions=self.positions[list(nodes)],
             mass=self.mass[np.ix_(order, order)],
             stiffness=self.stiffness[np.ix_(order, order)],
+            gyroscopic=None if self.gyroscopic is None else self.gyroscopic[np.ix_(order, order)],
         )
 
     def rigid_motions(self, centre: Sequence[float] | Floats) -> Floats:
@@ -263,9 +268,13 @@ class EntryList:
 
 
 def interface_matrices(
-    stiffness: LabelledMatrix, mass: LabelledMatrix, nodes: NodeTable, path: object
+    stiffness: LabelledMatrix,
+    mass: LabelledMatrix,
+    nodes: NodeTable,
+    path: object,
+    gyroscopic: LabelledMatrix | None = None,
 ) -> InterfaceMatrices:
-    """Combine a stiffness and a mass matrix with the positions of their nodes.
+    """Combine a stiffness and a mass matrix, and a gyroscopic one if it is known, with the positions of their nodes.
 
     The nodes are in the order of their numbers. Local axes are removed. A coordinate that only one matrix has is zero
     in the other. A number without a position and with a single coordinate is a modal coordinate.
@@ -280,7 +289,8 @@ def interface_matrices(
         A node has no position, or the order of coordinates is not known or has another length than the matrices.
     """
     labels_of = {}
-    for name, matrix in (("stiffness", stiffness), ("mass", mass)):
+    given = {"stiffness": stiffness, "mass": mass} | ({} if gyroscopic is None else {"gyroscopic": gyroscopic})
+    for name, matrix in given.items():
         labels = nodes.order if matrix.labels is None else matrix.labels
         if len(labels) != len(matrix.values):
             raise MatrixFileError(
@@ -315,7 +325,7 @@ def interface_matrices(
     size = NODE_SIZE * len(numbers) + len(modal)
     check_size(size, path, "of all coordinates")
     whole = {}
-    for name, matrix in (("stiffness", stiffness), ("mass", mass)):
+    for name, matrix in given.items():
         at = np.array([place[label] for label in labels_of[name]])
         if len(np.unique(at)) < len(at):
             raise MatrixFileError(f"{path}: two rows of the {name} matrix have the same node and component")
@@ -330,6 +340,5 @@ def interface_matrices(
         nodes=tuple(numbers),
         positions=np.array([nodes.positions[number] for number in numbers]),
         modal=tuple(modal),
-        mass=to_global.T @ whole["mass"] @ to_global,
-        stiffness=to_global.T @ whole["stiffness"] @ to_global,
+        **{name: to_global.T @ matrix @ to_global for name, matrix in whole.items()},
     )
