@@ -16,6 +16,7 @@ from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.results.findings import Finding
 from exugear.results.interface_loads import interface_loads, loaded_seats, loads_csv, nastran_loads
+from exugear.results.sound.radiated_power import radiating_names
 from exugear.steady.steady_file import load_response
 from exugear.system.bearings.stiffness import elastic_names
 from exugear.system.bodies.external import interface_of
@@ -50,7 +51,7 @@ def export_matrices(
     if body not in flexible:
         raise BadInputError(f"--matrices {body}: no such flexible body; flexible bodies are {', '.join(flexible)}")
     target = to or project.folder / FOLDER
-    keys = keys_of(body, form)
+    keys = keys_of(body, form, body in radiating_names(project.gearbox, Variant.flexible))
     _refuse_existing(target, keys.values())
     project.begin()
     reduced = project.bodies()[body].reduced

@@ -142,8 +142,8 @@ class SolidSection(Section):
     """A body of arbitrary shape from a file in the folder of the gearbox file, in the axes of the gearbox.
 
     Geometry (.step, .stp, .brep, or the script .geo, which needs permission to run) is meshed with tetrahedra by gmsh;
-    a mesh (.msh, .inp, .vtu, .vtk) is used unchanged. `torque_seat` names the seat at which torques act. The keys of
-    `blanks` are seats.
+    a mesh (.msh, .inp, .bdf, .nas, .vtu, .vtk) is used unchanged. `torque_seat` names the seat at which torques act.
+    The keys of `blanks` are seats.
     """
 
     file: FileName
@@ -211,6 +211,10 @@ class ExternalSection(Section):
     """File with the mass matrix."""
     gyroscopic: FileName | None = None
     """File with the gyroscopic matrix of a shaft per rad/s about +z of the gearbox, antisymmetric, both triangles."""
+    recovery: FileName | None = None
+    """File (.npz) with the outer surface of a fixed body and its motion by the coordinates, for its sound power."""
+    band_Hz: q.FrequencyHz | None = None
+    """Cut-off frequency of the modal coordinates, for the sound power; `elasticity.band_Hz` by default."""
     nodes: FileName | None = None
     """File with the positions of the nodes (.csv, .inp, .npz, .pch, .bdf), if the matrices have none."""
     stiffness_name: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,15}$")] | None = None

@@ -29,6 +29,7 @@ from exugear.system.bodies.matrix_files.interface import InterfaceMatrices, Unit
 from exugear.system.bodies.reduction import (
     BodySurface,
     Frame,
+    RadiatingSurface,
     ReducedBody,
     ReductionError,
     ReductionSummary,
@@ -77,6 +78,8 @@ class ExternalModel:
     seats: tuple[NodeSeat, ...]
     frame: Frame
     """Reference frame of the coordinates."""
+    band: float
+    """Highest frequency at which the file has modes, for the sound of its surface, Hz."""
     limit: float
     """Limit to which mass scaling lowers higher mode frequencies, Hz."""
     axis: tuple[float, float] = (0.0, 0.0)
@@ -95,7 +98,7 @@ class ExternalModel:
             "files": self.file_digest,
             "names": dict(self.files.names or {}),
             "seats": [asdict(seat) for seat in self.seats],
-            "rest": [self.name, self.units, self.rotation, self.shift, self.frame, self.limit, self.axis],
+            "rest": [self.name, self.units, self.rotation, self.shift, self.frame, self.limit, self.axis, self.band],
         }
         return hashlib.sha256(json.dumps(words, sort_keys=True).encode()).hexdigest()
 
@@ -227,6 +230,11 @@ def reduce_external(model: ExternalModel) -> ReducedBody:
         spin=spin,
         frame=model.frame,
         modal_groups=("inner",) * len(matrices.modal),
+        radiating=(
+            None
+            if matrices.normal_motion is None
+            else RadiatingSurface(symmetric(matrices.normal_motion), matrices.area, matrices.area, model.band)
+        ),
         surface=marked_nodes(matrices.positions, matrices.size),
         summary=ReductionSummary({}, time.perf_counter() - began, {"whole": ()}, {"whole": mass_scaled}),
     )
@@ -290,7 +298,7 @@ def marked_nodes(positions: Floats, size: int) -> BodySurface:
 
 
 def interface_of(body: ReducedBody) -> InterfaceMatrices:
-    """Return mass and stiffness of a reduced body on its seats, for other programs; in SI units.
+    """Return mass, stiffness and surface of a reduced body on its seats, for other programs; in SI units.
 
     Nodes are numbered from 1 in the order of the seats. Modes above the limit of the body are at this limit.
 
@@ -309,4 +317,6 @@ def interface_of(body: ReducedBody) -> InterfaceMatrices:
         modal=tuple(range(FIRST_MODAL, FIRST_MODAL + len(body.modal_groups))),
         mass=body.mass,
         stiffness=body.stiffness,
+        normal_motion=None if body.radiating is None else body.radiating.matrix,
+        area=0.0 if body.radiating is None else body.radiating.area,
     )

@@ -67,6 +67,8 @@ def external_body(gearbox: Gearbox, name: str) -> ExternalBody:
         )
     if external.gyroscopic is not None and frame != "nonrotating":
         raise gearbox.error(f"{key}.gyroscopic: only shafts, in a frame that does not turn, have one; remove it")
+    if external.recovery is not None and frame != "ground":
+        raise gearbox.error(f"{key}.recovery: only fixed bodies radiate sound here; remove it")
     seats, sectors, shared = _seats(gearbox, body, external)
     names = [seat.name for seat in seats]
     if external.torque_seat is not None and external.torque_seat not in names:
@@ -81,6 +83,7 @@ def external_body(gearbox: Gearbox, name: str) -> ExternalBody:
         seats=tuple(seats),
         frame=frame,
         limit=gearbox.case.elasticity.limit_Hz,
+        band=external.band_Hz or gearbox.case.elasticity.band_Hz,
         axis=body.axis,
     )
     damping_time, loss_factor = external.damping_time_s, external.loss_factor or 0.0
@@ -105,6 +108,7 @@ def _files(gearbox: Gearbox, key: str, external: ExternalSection) -> MatrixFiles
         nodes=path("nodes", external.nodes),
         names=names,
         gyroscopic=path("gyroscopic", external.gyroscopic),
+        recovery=path("recovery", external.recovery),
     )
 
 

@@ -25,6 +25,7 @@ from exugear.system.bodies.matrix_files.plain import (
     read_npz,
 )
 from exugear.system.bodies.matrix_files.punch import punch_content, punch_nodes_content, read_punch
+from exugear.system.bodies.matrix_files.recovery import read_recovery, recovery_content, with_surface
 
 MatrixFormat = Literal["npz", "csv", "mtx", "op4", "dmig"]
 Kind = Literal["stiffness", "mass", "gyroscopic"]
@@ -69,11 +70,13 @@ class MatrixFiles:
     names: Mapping[Kind, str] | None = None
     """Names of the matrices in Nastran files; by default the first of `NAMES` that is there."""
     gyroscopic: Path | None = None
+    recovery: Path | None = None
+    """Surface, see `exugear.system.bodies.matrix_files.recovery`."""
 
     @property
     def paths(self) -> tuple[Path, ...]:
         """All files."""
-        given = (self.file, self.stiffness, self.mass, self.nodes, self.gyroscopic)
+        given = (self.file, self.stiffness, self.mass, self.nodes, self.gyroscopic, self.recovery)
         return tuple(path for path in given if path is not None)
 
 
@@ -116,11 +119,16 @@ def read_matrices(files: MatrixFiles) -> InterfaceMatrices:
             f"whose name ends in {', '.join(NODE_ENDINGS)}"
         )
     path, table = tables[0]
-    gyroscopic = None
+    more: dict[str, LabelledMatrix] = {}
     if files.gyroscopic is not None:
         found, others, _ = _read(files.gyroscopic, frozenset(NAMES["gyroscopic"]))
-        gyroscopic = _chosen(files.gyroscopic, found, others, "gyroscopic", files)
-    return interface_matrices(matrices["stiffness"], matrices["mass"], table, path, gyroscopic)
+        more["gyroscopic"] = _chosen(files.gyroscopic, found, others, "gyroscopic", files)
+    if files.recovery is None:
+        return interface_matrices(matrices["stiffness"], matrices["mass"], table, path, more)
+    recovery = read_recovery(files.recovery)
+    more["normal_motion"] = recovery.normal_motion
+    combined = interface_matrices(matrices["stiffness"], matrices["mass"], table, path, more)
+    return with_surface(combined, recovery, files.recovery)
 
 
 def read_nodes(path: Path) -> NodeTable:
@@ -201,22 +209,25 @@ def file_contents(matrices: InterfaceMatrices, stem: str, form: MatrixFormat) ->
     stem : beginning of the file names
     form : npz, csv, mtx (Abaqus matrix input) and op4 (ASCII) keep all digits; dmig (Nastran punch) ten to fourteen
     """
+    surface = {} if matrices.normal_motion is None else {f"{stem}-surface.npz": recovery_content(matrices)}
     if form == "npz":
-        return {f"{stem}.npz": npz_content(matrices)}
+        return {f"{stem}.npz": npz_content(matrices)} | surface
     if form == "dmig":
-        return {f"{stem}.pch": punch_content(matrices, WRITTEN_NAMES)}
+        return {f"{stem}.pch": punch_content(matrices, WRITTEN_NAMES)} | surface
     if form == "op4":
-        return {
+        return surface | {
             f"{stem}.op4": op4_content(matrices, WRITTEN_NAMES),
             f"{stem}-nodes.pch": punch_nodes_content(matrices),
         }
     content = csv_matrix_content if form == "csv" else mtx_content
     files = {f"{stem}-{kind}.{form}": content(matrices, kind) for kind in KINDS}
-    return {**files, f"{stem}-nodes.csv": csv_nodes_content(matrices)}
+    return {**files, f"{stem}-nodes.csv": csv_nodes_content(matrices)} | surface
 
 
-def keys_of(stem: str, form: MatrixFormat) -> dict[str, str]:
+def keys_of(stem: str, form: MatrixFormat, with_surface: bool = False) -> dict[str, str]:
     """Keys of `[bodies.NAME.external]` that name the files of `file_contents`."""
+    if with_surface:
+        return {**keys_of(stem, form), "recovery": f"{stem}-surface.npz"}
     if form in ("npz", "dmig"):
         return {"file": f"{stem}.{'pch' if form == 'dmig' else form}"}
     if form == "op4":
