@@ -314,10 +314,15 @@ class Project(ReprMixin):
             ``[operation]``
         progress : called with the number of finished speeds and the total
         """
-        from exugear.steady.steady_file import stored_or_computed  # kernels that a run does not need
+        # Kernels that a run does not need
+        from exugear.steady.mean_system.mean_system import unsuitable
+        from exugear.steady.mean_system.planet_sets import SteadyError
+        from exugear.steady.steady_file import stored_or_computed
 
         settings = settings or SteadySettings(usual_speeds(self.gearbox))
         assembly = self.assembly()
+        if reason := unsuitable(assembly):
+            raise SteadyError(reason)
         choice = self.choice
         self.keep_case()
         with time_noted(self.folder, f"steady, {choice.variant}, {choice.inertias}, {choice.mesh_model}"):

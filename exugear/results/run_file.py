@@ -505,7 +505,7 @@ def _load_pieces(folder: Path, wanted: list[str] | None) -> xr.Dataset:
             growing = variable.dimensions[0] in GROWING
             values = np.concatenate(parts[name]) if growing else parts[name][-1]
             data[name] = (variable.dimensions, values, variable.attributes)
-    _LAYOUT.check(data, folder)
+    _LAYOUT.check_dataset(data, folder)
     return data if wanted is None else data[wanted]
 
 

@@ -21,16 +21,15 @@ import scipy.linalg
 from exugear.steady.balance.excitation import HarmonicBalanceModel, Interface
 from exugear.steady.balance.response import mean_deviation_forces, transmission_errors
 from exugear.steady.campbell import ModeTracks
-from exugear.steady.harmonics.branches import NEIGHBOURS, predicted_top, standing_peaks
+from exugear.steady.harmonics.branches import NEIGHBOURS, predicted_tops, standing_peaks
 from exugear.steady.mean_system.mean_system import MeanSystem, mean_modes
 from exugear.steady.mean_system.mesh_places import DEFLECTION
 from exugear.steady.mean_system.signals import Quantity
-from exugear.system.statics import linearise
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, SingleComplexes
 from fe_ste.tools.threads import side_by_side
 
 Forcing = Callable[[Interface], Complexes]
-KnownTops = dict[tuple[str, int, int, int, bytes], tuple[float, float]]
+KnownTops = dict[tuple[str, int, int, int, bytes], list[float]]
 """Place and height of tops by quantity, line, place of the quantity, and the speeds around."""
 HARMONICS = 3
 """Multiples of the fastest mesh frequency up to which modes are followed."""
@@ -184,23 +183,37 @@ def missed_tops(
         ]
         peaks.sort(key=lambda peak: -highest[peak])
         loudest = dict.fromkeys(peaks[:LOUDEST]) | dict.fromkeys([peak for peak in peaks if inside[peak[0]]][:LOUDEST])
+        keys: dict[tuple[int, int], tuple[str, int, int, int, bytes]] = {}
+        # Curves at one place whose peaks have as many neighbours on either side are evaluated together.
+        alike: dict[tuple[int, int, int], list[tuple[int, int]]] = {}
         for point, line in loudest:
-            around = slice(max(point - NEIGHBOURS, 0), point + NEIGHBOURS + 1)
-            if not smooth[around].all():
-                continue
-            place = int(argmax[point, line])
-            key = quantity.name, line, place, point - around.start, speeds[around].tobytes()
-            if key not in known:
-                values = quantity.components(amplitude[around, line + 1], place)
-                size = partial(quantity.size, place=place)
-                known[key] = predicted_top(speeds[around], values, point - around.start, size)
+            around = _around(point, len(speeds))
+            if smooth[around].all():
+                place = int(argmax[point, line])
+                keys[point, line] = quantity.name, line, place, point - around.start, speeds[around].tobytes()
+                if keys[point, line] not in known:
+                    alike.setdefault((place, point - around.start, around.stop - around.start), []).append(
+                        (point, line)
+                    )
+        for (place, before, count), found in alike.items():
+            points, lines = np.array(found).T
+            at = points[:, None] - before + np.arange(count)
+            values = quantity.components(amplitude[at, lines[:, None] + 1], place)
+            predicted = predicted_tops(speeds[at], values, before, partial(quantity.size, place=place))
+            known |= zip([keys[peak] for peak in found], np.transpose(predicted).tolist(), strict=True)
+        for (point, line), key in keys.items():
             top, height = known[key]
             near = APART * (speeds[point + 1] - speeds[point - 1])
             new = all(abs(top - other) > near for other in tops)
-            new &= bool((np.abs(speeds[around] - top) > COINCIDE * abs(top)).all())
+            new &= bool((np.abs(speeds[_around(point, len(speeds))] - top) > COINCIDE * abs(top)).all())
             if new and height > (1.0 + GAIN) * highest[point, line]:
                 tops.append(top)
     return np.sort(np.array(tops))
+
+
+def _around(point: int, count: int) -> slice:
+    """Return the places of a point and its neighbours, among so many."""
+    return slice(max(point - NEIGHBOURS, 0), min(point + NEIGHBOURS + 1, count))
 
 
 def _passages(tracks: ModeTracks, orders: Floats) -> list[tuple[int, int, float]]:
@@ -329,7 +342,7 @@ def contributions(model: HarmonicBalanceModel, speed: float, line: int) -> Contr
     for source in dict.fromkeys(filter(None, model.shaft_orders.source)):
         if part := complex(2.0 * adjoint @ model.shaft_loads(speed, source)[line]):
             meshes[source] = meshes.get(source, 0.0) + _share(part, total)
-    supports, bodies = _derivatives(model, speed, frequency, adjoint, motion, total)
+    supports, bodies = _derivatives(model.system, frequency, adjoint, motion, total)
     modes = _modes(model, speed, frequency, loads, row, total)
     return Contributions(speed, abs(total), meshes, modes, supports, bodies)
 
@@ -383,19 +396,17 @@ def _modes(
 
 
 def _derivatives(
-    model: HarmonicBalanceModel, speed: float, frequency: float, adjoint: Complexes, motion: Complexes, total: complex
+    system: MeanSystem, frequency: float, adjoint: Complexes, motion: Complexes, total: complex
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Relative changes of the amplitude per relative change of bearings' stiffness and of bodies' inertia.
 
     A change dD of the dynamic stiffness D changes the signal by -(row D^-1) dD (D^-1 loads). Damping goes with the
     stiffness.
     """
-    system = model.system
-    frame = model.system.frame
+    frame = system.frame
     assembly = frame.assembly
     t = frame.matrices(0.0)[0]
-    q, _, _ = frame.state(0.0, speed, system.static_at(speed))
-    elements = linearise(assembly, q, frame.mean_meshes)
+    elements = system.elements
     adjoint = t @ adjoint
     motion = t @ motion
     supports: dict[str, float] = {}

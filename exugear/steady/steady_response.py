@@ -38,7 +38,14 @@ from exugear.steady.mean_system.mesh_places import DEFLECTION
 from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.mean_system.signals import SignalName
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
-from exugear.steady.settings import SteadySettings, check_deviations, check_law, check_ring, check_speeds
+from exugear.steady.settings import (
+    SteadySettings,
+    check_continuation,
+    check_deviations,
+    check_law,
+    check_ring,
+    check_speeds,
+)
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers, SingleComplexes, Texts
 from fe_ste.tools.display import ReprMixin, TitledRows, value_range
@@ -167,6 +174,9 @@ class SolvedPoints:
     mean."""
     growth: Floats
     """(points,) largest growth rate of a disturbance, 1/s, on a continuation and with contact loss; NaN elsewhere."""
+    mean_angles: Booleans
+    """(points,) whether stated loads are at the angles of the mean speed because they did not settle at those that the
+    vibration gives their bodies, with the method `nonlinear`."""
     remark: Texts
     """(points,) what is to be said of a point, or why there is none: its numbers are NaN then."""
 
@@ -307,6 +317,7 @@ def response_of(
     check_speeds(assembly.gearbox, settings.speeds)
     check_law(assembly.mesh_model, settings.method)
     check_deviations(assembly.gearbox, settings.method)
+    check_continuation(assembly.gearbox, settings.branches)
     check_ring(assembly, settings.method)
     even = settings.speeds.values
     model = harmonic_balance_model(assembly, even, settings.harmonics, settings.combinations)
@@ -339,7 +350,7 @@ def response_of(
     is_solved = np.isfinite(points.drive_torque)
     if not is_solved.any():
         raise HarmonicBalanceError(str(points.remark[0]))
-    solved = points.part(is_solved)
+    solved = points if is_solved.all() else points.part(is_solved)
     linear = solver.linear
     frozen = linear.frozen
     explained = []
@@ -402,16 +413,18 @@ def _with_tops(
     tops: KnownTops = {}
     for _ in range(ROUNDS):
         is_solved = np.flatnonzero(np.isfinite(points.drive_torque))
-        solved = points.part(is_solved[np.argsort(points.speed[is_solved], kind="stable")])
-        smooth = np.asarray(~(solved.apart.any(axis=1) | solved.free.any(axis=1)))
-        more = missed_tops(solved.speed, solved.amplitude, smooth, solver.model.quantities, operation, tops)
+        order = is_solved[np.argsort(points.speed[is_solved], kind="stable")]
+        smooth = np.asarray(~(points.apart.any(axis=1) | points.free.any(axis=1)))[order]
+        quantities = solver.model.quantities
+        more = missed_tops(points.speed[order], points.amplitude[order], smooth, quantities, operation, tops)
         if not more.size:
             break
         count = len(points.speed)
         points = points.joined_with(_empty(solver.model, more))
         solve(points, count, lambda: PointSolver(solver.linear, solver.method))
         # A speed that was not requested and has no steady state is dropped without a warning.
-        points = points.part((np.arange(len(points.speed)) < count) | np.isfinite(points.drive_torque))
+        kept = (np.arange(len(points.speed)) < count) | np.isfinite(points.drive_torque)
+        points = points if kept.all() else points.part(kept)
     return points
 
 
@@ -528,6 +541,7 @@ def _empty(model: HarmonicBalanceModel, speeds: Floats) -> SolvedPoints:
         apart=np.zeros((points, len(model.waves.waves))),
         free=np.zeros((points, len(model.bearing_names))),
         growth=np.full(points, np.nan),
+        mean_angles=np.zeros(points, dtype=bool),
         remark=np.zeros(points, dtype=f"<U{LONGEST_WARNING}"),
     )
 
@@ -542,5 +556,7 @@ def _fill(out: SolvedPoints, n: int, model: HarmonicBalanceModel, response: Resp
     out.products[n] = response.products
     out.apart[n] = response.apart
     out.free[n] = response.free
+    loads = response.interface.loads
+    out.mean_angles[n] = loads is not None and loads.at_mean_angles
     least = max(RESOLVED * exchanged_power(response), 1e-300)
     out.energy_error[n] = (taken - given) / max(abs(taken), abs(given), least)

@@ -30,6 +30,7 @@ from exugear.steady.settings import (
     Method,
     SpeedRange,
     SteadySettings,
+    check_continuation,
     check_deviations,
     check_law,
     check_speeds,
@@ -67,6 +68,7 @@ def settings_of_options(
     """Return the settings that the options state; raise an error if they are invalid for the project."""
     check_law(project.choice.mesh_model, method)
     check_deviations(project.gearbox, method)
+    check_continuation(project.gearbox, branches)
     check_speeds(project.gearbox, speeds)
     return SteadySettings(speeds, method, harmonics, branches=branches)
 
@@ -84,10 +86,12 @@ def check_radiating_body(project: Project) -> None:
 def steady(project: WatchedProject, settings: SteadySettings, quantity: str | None, as_json: bool, whole: bool) -> None:
     """Compute, store and print the response of a project."""
     gearbox = project.gearbox
+    variant = project.choice.variant
     # A variant without steady-state response is refused before tables and finite elements are computed.
-    with suppress(FailedError):  # such a failure does not apply to the selected mesh model
-        if reason := steady_lack(assembled_by_iso(gearbox, project.choice.variant), project.choice.variant):
-            raise BadInputError(reason)
+    if variant.is_elastic or not all(request.stored for request in project.missing_tables()):
+        with suppress(FailedError):  # such a failure does not apply to the selected mesh model
+            if reason := steady_lack(assembled_by_iso(gearbox, variant), variant):
+                raise BadInputError(reason)
     if quantity == "sound_power":
         check_radiating_body(project)
     check_friction(gearbox, project.choice.mesh_model)
@@ -151,6 +155,11 @@ def summarise(
         "not_converged": [
             {"speed_rpm": point["speed"] / RPM, "reason": point["reason"]}
             for point in json.loads(data.attrs["not_converged"])
+        ],
+        "excitations_at_mean_angles_rpm": [
+            abs(float(speed)) / RPM
+            for speed, mean in zip(data["speed"].values, data["loads_at_mean_angles"].values, strict=True)
+            if mean
         ],
         "unstable_points": int((data["growth"] > 0.0).sum()),
         "largest_energy_error": float(abs(data["energy_error"]).max()),

@@ -18,7 +18,6 @@ from exugear.results.folder import bodies_folder
 from exugear.results.run_file import FINAL_NAME, PARTIAL_NAME, invalidity_of, load_run
 from exugear.results.spectra.run_spectra import RunSignals, VariantRun, analysed, run_signals
 from exugear.results.spectra.waterfall import order_lines
-from exugear.steady.evaluation.measured_comparison import comparison_hash, load_comparison
 from exugear.steady.steady_file import load_response, settings_of
 from exugear.system.bearings.rolling.rows import BearingError
 from exugear.system.bodies.elastic_body import ElasticBody
@@ -193,6 +192,9 @@ def _stored_steady(context: Context) -> Iterator[xr.Dataset]:
 
 def _stored_measured(context: Context) -> Iterator[xr.Dataset]:
     """Read the comparisons with measured run-ups that belong to the section and to the response of the gearbox file."""
+    # Recordings and spectra that other commands do not read
+    from exugear.steady.evaluation.measured_comparison import comparison_hash, load_comparison
+
     for name, section in context.gearbox.case.measurements.items():
         for path in sorted(context.folder.glob(f"*/*/measured-{name}.nc")):
             try:

@@ -38,11 +38,11 @@ from exugear.steady.mean_system.mesh_places import (
     MISALIGNMENT,
     POSITION,
     TILT,
+    CycleFunctions,
     Family,
     MeshInterface,
     MeshPlaces,
     Spectra,
-    coupled,
     families,
     group_of,
     mesh_places,
@@ -87,6 +87,9 @@ class LoadResponse:
     """(n, size) motion under them."""
     torque: float
     """Mean torque of the drive that overcomes them, N m."""
+    at_mean_angles: bool = False
+    """Whether stated loads are at the angles of the mean speed because they did not settle at those that the vibration
+    gives their bodies."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -559,6 +562,39 @@ class HarmonicBalanceModel:
         return found
 
     @cached_property
+    def tangents_beyond_mean(self) -> CycleFunctions:
+        """The same beyond the averaged system, as functions of the mesh cycles."""
+        forces = self._ports["forces"].shape[2]
+        means = np.zeros((len(self.waves.waves), forces))
+        means[:, DEFLECTION] = self.waves.mean_stiffness
+        if self.shuttles:
+            means[:, MISALIGNMENT] = self.ring_tilting[:, 0]
+        return CycleFunctions(self.waves, self.families, self.cycle_tangents, forces, means)
+
+    @cached_property
+    def slopes_over_cycle(self) -> CycleFunctions:
+        """Derivative of the tangents by the position, N/m per cycle."""
+        return self.functions({(DEFLECTION, DEFLECTION): self._derivative * self.cycle_coefficients})
+
+    @cached_property
+    def pulls_over_cycle(self) -> CycleFunctions:
+        """Derivative of the forces that curves have without deflection by the position, N per cycle."""
+        return self.functions({(DEFLECTION, DEFLECTION): -self._derivative * self.cycle_pulls})
+
+    @property
+    def _derivative(self) -> Complexes:
+        """Derivative of harmonics (harmonics + 1,) by the position, 1 per cycle."""
+        return np.asarray(2j * np.pi * np.arange(self.harmonics + 1))
+
+    @cached_property
+    def given(self) -> CycleFunctions:
+        """Forces of tangents at zero deflection over the mesh cycle: of curves, and moments where loads shuttle."""
+        spectra = {(DEFLECTION, DEFLECTION): -self.cycle_pulls}
+        if self.shuttles:
+            spectra[MISALIGNMENT, DEFLECTION] = self.cycle_moments_given
+        return self.functions(spectra)
+
+    @cached_property
     def ring_tilting(self) -> Floats:
         """`MeshWaves.tilting` of each wave's mesh (m, 3)."""
         return np.asarray(self.waves.tilting[[wave.first for wave in self.waves.waves]])
@@ -603,9 +639,9 @@ class HarmonicBalanceModel:
         group = Group(0, len(self.waves.waves), np.concatenate([multiples, -multiples]))
         return lines, HarmonicCoupling(self.lines, (group,))
 
-    def coupled(self, spectra: Spectra, ports: MeshInterface, speed: float) -> list[Complexes]:
-        """Functions of the mesh cycles, by their harmonics, as `coupling` takes them at a speed of the input."""
-        return [coupled(self.waves, family, spectra, ports, speed, ports.forces.shape[1]) for family in self.families]
+    def functions(self, spectra: Spectra) -> CycleFunctions:
+        """Functions of the mesh cycles by their harmonics, which `coupling` takes at a speed of the input."""
+        return CycleFunctions(self.waves, self.families, spectra, self._ports["forces"].shape[2])
 
     @cached_property
     def lengths(self) -> Floats:

@@ -24,7 +24,7 @@ import numpy as np
 
 from exugear.steady.balance.excitation import HarmonicBalanceModel, Interface
 from exugear.steady.harmonics.lines import Group, HarmonicCoupling
-from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, Family, coupled
+from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, CycleFunctions, Family
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
 
 
@@ -48,7 +48,7 @@ class PassingPlanets:
 
     Parameters
     ----------
-    functions : (q, s, s) stiffness of the ring's waves beyond its mean, as `HarmonicBalanceModel.coupled` has it
+    functions : (q, s, s) stiffness of the ring's waves beyond its mean, as `CycleFunctions` has it
     answers : (n, k, k) readings of each line under a unit of each force
     lengths : (k,) what a reading counts as a length; readings are given as lengths
     """
@@ -69,7 +69,8 @@ class PassingPlanets:
         dampers = {(DEFLECTION, DEFLECTION): model.waves.damping[:, None].astype(np.complex128)}
         if model.shuttles:
             dampers[MISALIGNMENT, MISALIGNMENT] = model.ring_tilting[:, 1:2].astype(np.complex128)
-        of_damper = coupled(model.waves, family, dampers, interface.ports, interface.speed, forces)
+        functions_of_dampers = CycleFunctions(model.waves, [family], dampers, forces)
+        (of_damper,) = functions_of_dampers.at(interface.ports, interface.speed)
         of_damper /= lengths[self._waves]
         of_damper[family.turns] = 0.0  # the mean is in the averaged system
         self._of_damper = of_damper

@@ -25,7 +25,7 @@ from exugear.steady.balance.passing_planets import PassingPlanets
 from exugear.steady.harmonics.linear_solvers import solve_lines
 from exugear.steady.harmonics.lines import add_answered, flat
 from exugear.steady.mean_system.bearing_waves import TILTS
-from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, POSITION, MeshInterface, Spectra
+from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, POSITION, CycleFunctions, MeshInterface
 from exugear.system.kernels.meshes import TILT_DAMPING, TILT_STIFFNESS
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.bundles import cached_bundle
@@ -100,15 +100,15 @@ def transmission_errors(model: HarmonicBalanceModel, ports: MeshInterface, speed
     compliances, ways = (_varying(own) for own in (model.cycle_compliances, model.cycle_ways))
     spectra = {(DEFLECTION, DEFLECTION): -mean * compliances}
     # What the errors go with: force, and misalignment.
-    static = np.zeros((len(model.lines.index), *ports.forces.shape[:2]), dtype=complex)
-    static[0, :, DEFLECTION] = mean[:, 0] * model.pressed(ports.static)
+    static = np.zeros(ports.forces.shape[:2])
+    static[:, DEFLECTION] = mean[:, 0] * model.pressed(ports.static)
     if model.shuttles:
-        static[0, :, MISALIGNMENT] = ports.static[: len(mean), MISALIGNMENT]
+        static[:, MISALIGNMENT] = ports.static[: len(mean), MISALIGNMENT]
         spectra |= {(DEFLECTION, MISALIGNMENT): -mean * ways, (MISALIGNMENT, DEFLECTION): -ways}
-    found = _products(model, spectra, ports, speed, static)
+    found = _products_of_constants(model, model.functions(spectra), ports, speed, static)
     if model.shuttles:
         beyond = {(MISALIGNMENT, DEFLECTION): -_varying(model.cycle_moments_beyond)}
-        found += _products(model, beyond, ports, speed, _everywhere(model, found.shape))
+        found += _products_of_constants(model, model.functions(beyond), ports, speed, _everywhere(model, ports))
     found[0] = 0.0
     return found
 
@@ -129,49 +129,67 @@ def deviation_forces(model: HarmonicBalanceModel, interface: Interface) -> Compl
     errors = forces.copy()
     errors[..., DEFLECTION] = model.deviations(interface.speed)
     forces[..., DEFLECTION] = mean_deviation_forces(model, interface.speed)
-    beyond = _slopes_beyond_mean(model, interface)
+    beyond = model.tangents_beyond_mean.at(ports, interface.speed)
     return forces - model.coupling.of(beyond, errors.reshape(len(errors), -1)).reshape(forces.shape)
 
 
-def forces_of_positions(model: HarmonicBalanceModel, response: Response) -> Complexes:
-    """Find the forces (n, m, f) that meshes have because their positions in the cycle move with the shafts' orders, N.
+class MovingPositions:
+    """Forces that meshes have because their positions in the cycle move with the shafts' orders, at one speed.
 
     A change p of the position changes the force by p dF/dpmc. It makes the sidebands of mesh orders that a frequency
     modulation has.
     """
-    ports = response.interface.ports
-    speed = response.interface.speed
-    waves = model.waves
-    shape = len(model.lines.index), *ports.forces.shape[:2]
-    derivative = 2j * np.pi * np.arange(model.harmonics + 1)
-    deflection = np.zeros(shape, dtype=complex)
-    deflection[..., DEFLECTION] = response.deflection - model.deviations(speed)
-    slopes = {(DEFLECTION, DEFLECTION): derivative * model.cycle_coefficients}
-    changes = _products(model, slopes, ports, speed, deflection)
-    if waves.loads.any():
-        pulls = {(DEFLECTION, DEFLECTION): -derivative * model.cycle_pulls}
-        changes += _products(model, pulls, ports, speed, _everywhere(model, shape))
-    lines, coupling = model.slow_shifts
-    positions = response.motion[lines] @ np.ascontiguousarray(ports.readings[: shape[1], POSITION].T)
-    if (2.0 * np.abs(positions)).sum(axis=0).max(initial=0.0) > LARGEST_SHIFT:
-        return np.zeros(shape, dtype=complex)
-    shifts = np.concatenate([positions, positions.conj()])
-    # What two signals of a family of planets multiply to: each wave by the mean of the other.
-    mean = [next(n for n, own in enumerate(waves.waves) if own.first == wave.first) for wave in waves.waves]
-    products = np.zeros((len(shifts), shape[1], shape[1]), dtype=complex)
-    for n, at in enumerate(mean):
-        products[:, n, n] = shifts[:, at]
-        products[:, n, at] = shifts[:, n]
-    functions = [products]
-    forces = np.zeros(shape, dtype=complex)
-    forces[..., DEFLECTION] = coupling.of(functions, changes[..., DEFLECTION])
-    return forces
+
+    def __init__(self, model: HarmonicBalanceModel, interface: Interface) -> None:
+        ports = interface.ports
+        self._model = model
+        self._interface = interface
+        self._shape = len(model.lines.index), *ports.forces.shape[:2]
+        self._slopes = model.slopes_over_cycle.at(ports, interface.speed)
+        waves = model.waves.waves
+        self._lines, self._coupling = model.slow_shifts
+        self._rows = np.ascontiguousarray(ports.readings[: self._shape[1], POSITION].T)
+        # What two signals of a family of planets multiply to: each wave by the mean of the other.
+        self._mean = [next(n for n, own in enumerate(waves) if own.first == wave.first) for wave in waves]
+
+    @cached_property
+    def _pulls(self) -> Complexes | float:
+        """Changes (n, m, f) of the forces that curves have without deflection, N per cycle."""
+        model = self._model
+        if not model.waves.loads.any():
+            return 0.0
+        ports = self._interface.ports
+        pulls = model.pulls_over_cycle
+        return _products_of_constants(model, pulls, ports, self._interface.speed, _everywhere(model, ports))
+
+    def forces(self, deflections: Complexes, excess: Complexes) -> Complexes:
+        """Find the forces (n, m, f) at deflections (n, m) under forces (n, m f) beyond the averaged system, N."""
+        model = self._model
+        interface = self._interface
+        found = np.zeros(self._shape, dtype=complex)
+        moving = interface.motion[self._lines].reshape(len(self._lines), self._rows.shape[0], -1)
+        motion = -(moving @ excess[self._lines, :, None])[..., 0]
+        if interface.loads is not None:
+            motion += interface.loads.motion[self._lines]
+        positions = motion @ self._rows
+        if (2.0 * np.abs(positions)).sum(axis=0).max(initial=0.0) > LARGEST_SHIFT:
+            return found
+        along = np.zeros(self._shape, dtype=complex)
+        along[..., DEFLECTION] = deflections - model.deviations(interface.speed)
+        changes = model.coupling.of(self._slopes, along.reshape(len(along), -1)).reshape(self._shape) + self._pulls
+        shifts = np.concatenate([positions, positions.conj()])
+        products = np.zeros((len(shifts), self._shape[1], self._shape[1]), dtype=complex)
+        for n, at in enumerate(self._mean):
+            products[:, n, n] = shifts[:, at]
+            products[:, n, at] = shifts[:, n]
+        found[..., DEFLECTION] = self._coupling.of([products], changes[..., DEFLECTION])
+        return found
 
 
-def _everywhere(model: HarmonicBalanceModel, shape: tuple[int, ...]) -> Complexes:
-    """Values (n, m, f) of one at all times in all places: what these have alike is what the mean wave has."""
-    ones = np.zeros(shape, dtype=complex)
-    ones[0, :, DEFLECTION] = [wave.wave == 0 for wave in model.waves.waves]
+def _everywhere(model: HarmonicBalanceModel, ports: MeshInterface) -> Floats:
+    """Constants (m, f) of one in all places: what these have alike is what the mean wave has."""
+    ones = np.zeros(ports.forces.shape[:2])
+    ones[:, DEFLECTION] = [wave.wave == 0 for wave in model.waves.waves]
     return ones
 
 
@@ -180,14 +198,13 @@ def _varying(cycle: Complexes) -> Complexes:
     return np.asarray(cycle * (np.arange(cycle.shape[1]) > 0))
 
 
-def _products(
-    model: HarmonicBalanceModel, spectra: Spectra, ports: MeshInterface, speed: float, values: Complexes
+def _products_of_constants(
+    model: HarmonicBalanceModel, functions: CycleFunctions, ports: MeshInterface, speed: float, values: Floats
 ) -> Complexes:
-    """Products (n, m, f) of values (n, m, f) with functions of the mesh cycles."""
+    """Products (n, m, f) of constants (m, f) with functions of the mesh cycles."""
     if not values.size:  # a train without meshes
-        return values
-    functions = model.coupled(spectra, ports, speed)
-    return model.coupling.of(functions, values.reshape(len(values), -1)).reshape(values.shape)
+        return np.zeros((len(model.lines.index), *values.shape), dtype=complex)
+    return model.coupling.of_constants(functions.at(ports, speed), values.ravel()).reshape(-1, *values.shape)
 
 
 def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Response:
@@ -195,7 +212,7 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
 
     The equations y = y_static - G (K y - given) of all lines are solved with readings as lengths, l y. Where gears have
     deviations, the position moves with the orders of their shafts, too: what that adds to the forces is given by the
-    solution before (`forces_of_positions`). Without meshes it is the response of the method `linear`.
+    solution before (`MovingPositions`). Without meshes it is the response of the method `linear`.
     """
     if not model.waves.waves:
         return linear_response(model, interface)
@@ -208,6 +225,7 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
     passing = balance.passing
     given = given_forces(model, interface) + deviation_forces(model, interface)
     moved = np.zeros_like(given)
+    positions = MovingPositions(model, interface) if repeated else None
     found = None
     products = 0
     for again in reversed(range(1 + (POSITIONS_REPEATED if repeated else 0))):
@@ -215,15 +233,16 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
         start = still - (answers @ whole[..., None])[..., 0]
         found, more = balance.solve(start, found)
         products += more
-        excess = (whole + balance.forces(found)).reshape(shape)
-        response = _response(model, interface, (found / lengths).reshape(shape)[..., DEFLECTION], excess, products)
-        if again:
-            moved = forces_of_positions(model, response)
+        excess = whole + balance.forces(found)
+        deflection = (found / lengths).reshape(shape)[..., DEFLECTION]
+        if again and positions is not None:
+            moved = positions.forces(deflection, excess)
         if again and model.ring is not None:
+            response = _response(model, interface, deflection, excess.reshape(shape), products)
             shifted = at_mean_positions(model, interface, response)
             balance = LineBalance(model, shifted, answers, passing)
             given = given_forces(model, shifted) + deviation_forces(model, shifted)
-    return response
+    return _response(model, interface, deflection, excess.reshape(shape), products)
 
 
 class LineBalance:
@@ -242,7 +261,7 @@ class LineBalance:
         answers: Complexes,
         passing: PassingPlanets | None = None,
     ) -> None:
-        functions = _slopes_beyond_mean(model, interface)
+        functions = model.tangents_beyond_mean.at(interface.ports, interface.speed)
         lengths = model.lengths[: interface.ports.forces.shape[0], : interface.ports.forces.shape[1]].ravel()
         self._coupling = model.coupling
         self._functions = [
@@ -291,20 +310,6 @@ def at_mean_positions(model: HarmonicBalanceModel, interface: Interface, respons
     return replace(interface, ports=replace(ports, positions=positions, static=static))
 
 
-def _slopes_beyond_mean(model: HarmonicBalanceModel, interface: Interface) -> list[Complexes]:
-    """Return the slopes of the forces along a row beyond the averaged system, like `HarmonicBalanceModel.coupled`."""
-    functions = model.coupled(model.cycle_tangents, interface.ports, interface.speed)
-    forces = interface.ports.forces.shape[1]
-    for group, function in zip(model.coupling.groups, functions, strict=True):
-        mean = np.flatnonzero(~group.harmonics.any(axis=1))[0]
-        at = np.arange(DEFLECTION, group.size, forces)
-        waves = (group.begin + at) // forces
-        function[mean, at, at] -= model.waves.mean_stiffness[waves]
-        if model.shuttles:
-            function[mean, at + MISALIGNMENT, at + MISALIGNMENT] -= model.ring_tilting[waves, 0]
-    return functions
-
-
 def given_forces(model: HarmonicBalanceModel, interface: Interface) -> Complexes:
     """Return the forces (n, m, f) of tangents at zero deflection in addition to the averaged system: of curves only."""
     waves = model.waves
@@ -312,10 +317,7 @@ def given_forces(model: HarmonicBalanceModel, interface: Interface) -> Complexes
     shape = len(model.lines.index), *ports.forces.shape[:2]
     if not (waves.loads.any() or model.shuttles):
         return np.zeros(shape, dtype=complex)
-    spectra = {(DEFLECTION, DEFLECTION): -model.cycle_pulls}
-    if model.shuttles:
-        spectra[MISALIGNMENT, DEFLECTION] = model.cycle_moments_given
-    products = _products(model, spectra, ports, interface.speed, _everywhere(model, shape))
+    products = _products_of_constants(model, model.given, ports, interface.speed, _everywhere(model, ports))
     products[0, :, DEFLECTION] += waves.mean_stiffness * waves.rest
     if model.shuttles:
         products[0, :, MISALIGNMENT] += model.ring_tilting[:, 2] * [wave.wave == 0 for wave in waves.waves]

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 from exugear.gearbox.units import RPM
 from exugear.results.order_tracking.angle_cuts import BANDWIDTH, STEPS, angle_cuts
@@ -183,6 +182,8 @@ def compared_cuts(run_up: MeasuredRunUp, response: xr.Dataset, limits: SingleCom
     cuts = angle_cuts(run_up.values, run_up.shaft, [*lines, *beside], window, per)
     found = np.array([[cut.amplitude for cut in own] for own in cuts])
     frames = cuts[0][0]
+    from scipy.ndimage import median_filter  # a tenth of a second that other commands need not wait
+
     places = np.array([*rows.values()])
     amplitudes = [complex_amplitudes(response)[:, places], *(() if limits is None else limits[:, :, places])]
     names = [str(name) for name in response["signal"].to_numpy()]

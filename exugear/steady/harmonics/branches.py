@@ -319,17 +319,17 @@ def find_standing(values: Floats, stands: float, found: Integers) -> int:
     return count
 
 
-def predicted_top(
+def predicted_tops(
     places: Floats, values: Complexes, highest: int, size: Callable[[Complexes], Floats]
-) -> tuple[float, float]:
-    """Place and height of the top near the highest of some values, by a curve through it and its neighbours.
+) -> tuple[Floats, Floats]:
+    """Places and heights (k,) of the tops near the highest of some values of k curves, by curves through neighbours.
 
     Parameters
     ----------
-    places : (n,) ascending, five or more
-    values : (n, signals) all have the same poles
-    highest : which is the highest, neither the first nor the last
-    size : returns the heights (n,) of values (n, signals)
+    places : (k, n) ascending, five or more
+    values : (k, n, signals) all signals of a curve have the same poles
+    highest : which place is the highest, neither the first nor the last
+    size : returns the heights (...) of values (..., signals)
 
     Notes
     -----
@@ -341,49 +341,49 @@ def predicted_top(
     --------
     One resonance, whose top lies between two places:
 
-    >>> x = np.array([0.9, 0.95, 0.99, 1.02, 1.06])
+    >>> x = np.array([[0.9, 0.95, 0.99, 1.02, 1.06]])
     >>> values = 0.02 / (1.0 - x**2 + 0.02j * x)
-    >>> place, height = predicted_top(x, values[:, None], 2, lambda own: np.abs(own[:, 0]))
-    >>> round(place, 4), round(height, 4)
-    (0.9999, 1.0001)
+    >>> place, height = predicted_tops(x, values[..., None], 2, lambda own: np.abs(own[..., 0]))
+    >>> print(round(float(place[0]), 4), round(float(height[0]), 4))
+    0.9999 1.0001
     """
-    found = [float(places[highest]), float(size(values)[highest])]
+    found = [(places[:, highest], size(values)[:, highest])]
     # Where curves through other neighbours differ, the highest is to be looked at.
-    for first in range(max(highest - 3, 0), min(highest, len(places) - NEIGHBOURS + 1)):
-        found = max(found, list(_top(places, values, highest, first, size)), key=lambda peak: peak[1])
-    return found[0], found[1]
+    for first in range(max(highest - 3, 0), min(highest, places.shape[1] - NEIGHBOURS + 1)):
+        found.append(_tops(places, values, highest, first, size))
+    tops, heights = np.swapaxes(found, 0, 1)
+    which = heights.argmax(axis=0)
+    return np.choose(which, tops), heights.max(axis=0)
 
 
-def _top(
+def _tops(
     places: Floats, values: Complexes, highest: int, first: int, size: Callable[[Complexes], Floats]
-) -> tuple[float, float]:
-    """Place and height of the top near a place by the curve through five places from one on."""
-    middle = places[highest]
-    width = places[highest + 1] - places[highest - 1]
-    x = (places[first : first + NEIGHBOURS] - middle) / width
-    f = values[first : first + NEIGHBOURS]
-    carrying = x[SUPPORT]
-    others = x[OTHERS]
-    divided = (f[OTHERS][:, None] - f[SUPPORT]) / (others[:, None] - carrying)[..., None]
-    weights = np.linalg.svd(np.moveaxis(divided, 2, 1).reshape(-1, len(SUPPORT)))[2][-1].conj()
-
-    def heights(at: Floats) -> Floats:
-        apart = at[:, None] - carrying
-        parts = weights / np.where(apart == 0.0, NODE_DISTANCE, apart)
-        return size((parts @ f[SUPPORT]) / parts.sum(axis=1)[:, None])
-
-    low, high = ((places[highest + side] - middle) / width for side in (-1, 1))
-    top = 0.0
-    height = float(size(values)[highest])
+) -> tuple[Floats, Floats]:
+    """Places and heights (k,) of the tops near a place by the curves through five places from one on."""
+    middle = places[:, highest]
+    width = places[:, highest + 1] - places[:, highest - 1]
+    scaled = (places - middle[:, None]) / width[:, None]
+    x = scaled[:, first : first + NEIGHBOURS]
+    f = values[:, first : first + NEIGHBOURS]
+    carrying = x[:, SUPPORT]
+    apart = x[:, OTHERS, None] - carrying[:, None, :]
+    divided = (f[:, OTHERS, None] - f[:, None, SUPPORT]) / apart[..., None]
+    loewner = np.swapaxes(divided, 2, 3).reshape(len(x), -1, len(SUPPORT))
+    weights = np.linalg.svd(loewner)[2][:, -1].conj()
+    low, high = scaled[:, highest - 1], scaled[:, highest + 1]
+    top = np.zeros(len(x))
+    height = size(values)[:, highest]
     for _ in range(CLOSER):
-        at = np.linspace(low, high, LOOKED_AT)
-        found = heights(at)
-        best = int(np.argmax(found))
-        if not found[best] > height:
-            break
-        top = float(at[best])
-        height = float(found[best])
         step = (high - low) / LOOKED_AT
-        low = max(low, top - step)
-        high = min(high, top + step)
-    return float(middle + top * width), height
+        at = np.linspace(low, high, LOOKED_AT, axis=-1)
+        beside = at[..., None] - carrying[:, None, :]
+        parts = weights[:, None, :] / np.where(beside == 0.0, NODE_DISTANCE, beside)
+        found = size((parts @ f[:, SUPPORT]) / parts.sum(axis=2)[..., None])
+        best = found.argmax(axis=1)[:, None]
+        risen = np.take_along_axis(found, best, axis=1)[:, 0] > height
+        top = np.where(risen, np.take_along_axis(at, best, axis=1)[:, 0], top)
+        height = np.fmax(height, found.max(axis=1))
+        # A curve that rises no more is not looked at more closely.
+        low = np.where(risen, np.maximum(low, top - step), low)
+        high = np.where(risen, np.minimum(high, top + step), high)
+    return middle + top * width, height

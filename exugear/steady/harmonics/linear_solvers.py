@@ -138,6 +138,11 @@ class Elimination(NamedTuple):
     below: Integers
     right: Integers
     """(r,) entries in the column and in the row of the step."""
+    above: Integers
+    """(n + 1,) first of the earlier steps that touch the row of each step, in the two arrays that follow."""
+    earlier: Integers
+    touch: Integers
+    """(r,) those steps, ascending, and their places among `later`."""
     change: Integers
     """(n,) first of the entries in `changed` that each step changes, row by row of its later rows."""
     changed: Integers
@@ -176,15 +181,20 @@ def elimination(pattern: Booleans) -> Elimination:
     entry = np.full((n, n), -1, dtype=np.int64)
     entry[row, column] = np.arange(len(row))
     none = np.zeros(0, dtype=np.int64)
+    later = np.concatenate([none, *(step[others] for others in touched)])
+    touch = np.argsort(later, kind="stable").astype(np.int64)
     return Elimination(
         order=np.array(order, dtype=np.int64),
         row=row.astype(np.int64),
         column=column.astype(np.int64),
         diagonal=entry[order, order],
         first=np.cumsum([0, *map(len, touched)]).astype(np.int64),
-        later=np.concatenate([none, *(step[others] for others in touched)]),
+        later=later,
         below=np.concatenate([none, *(entry[others, k] for k, others in zip(order, touched, strict=True))]),
         right=np.concatenate([none, *(entry[k, others] for k, others in zip(order, touched, strict=True))]),
+        above=np.searchsorted(later[touch], np.arange(n + 1)).astype(np.int64),
+        earlier=np.repeat(np.arange(n), [len(others) for others in touched])[touch],
+        touch=touch,
         change=np.cumsum([0, *(len(others) ** 2 for others in touched[:-1])]).astype(np.int64),
         changed=np.concatenate([none, *(entry[np.ix_(others, others)].ravel() for others in touched)]),
     )
@@ -320,8 +330,8 @@ def eliminate(plan: Elimination, loads: Floats, real: Floats, imaginary: Floats,
             put(x, at, all_eight(loads[k, case]))
             put(x, at + SIZE, all_eight(0.0))
     for k in range(size):
-        invert(SIZE * plan.diagonal[k], real, imaginary)
         eliminate_row(k, cases, plan, real, imaginary, x)
+        invert(SIZE * plan.diagonal[k], real, imaginary)
     for k in range(size - 1, -1, -1):
         substitute_back(k, cases, plan, real, imaginary, x)
 
@@ -335,17 +345,18 @@ def invert(at: int, real: Floats, imaginary: Floats) -> None:
 
 
 @kernel
-def eliminate_row(k: int, cases: int, plan: Elimination, real: Floats, imaginary: Floats, out: Floats) -> None:
-    """Take the row of step k, its diagonal inverted, out of all later rows."""
-    x = eight(real, SIZE * plan.diagonal[k])
-    y = eight(imaginary, SIZE * plan.diagonal[k])
-    begin = plan.first[k]
-    end = plan.first[k + 1]
-    change = plan.change[k]
-    for i in range(begin, end):
-        at = SIZE * plan.below[i]
-        a = eight(real, at)
-        b = eight(imaginary, at)
+def eliminate_row(i: int, cases: int, plan: Elimination, real: Floats, imaginary: Floats, out: Floats) -> None:
+    """Take all earlier rows, their diagonals inverted, out of the row of step i, which stays in the fastest memory."""
+    for at_step in range(plan.above[i], plan.above[i + 1]):
+        k = plan.earlier[at_step]
+        touch = plan.touch[at_step]
+        begin = plan.first[k]
+        end = plan.first[k + 1]
+        change = plan.change[k] + (touch - begin) * (end - begin)
+        x = eight(real, SIZE * plan.diagonal[k])
+        y = eight(imaginary, SIZE * plan.diagonal[k])
+        a = eight(real, SIZE * plan.below[touch])
+        b = eight(imaginary, SIZE * plan.below[touch])
         factor = a * x - b * y
         turned = a * y + b * x
         for j in range(begin, end):
@@ -358,7 +369,7 @@ def eliminate_row(k: int, cases: int, plan: Elimination, real: Floats, imaginary
             put(imaginary, to, eight(imaginary, to) - factor * b - turned * a)
         for case in range(cases):
             at = 2 * SIZE * (k * cases + case)
-            to = 2 * SIZE * (plan.later[i] * cases + case)
+            to = 2 * SIZE * (i * cases + case)
             a = eight(out, at)
             b = eight(out, at + SIZE)
             put(out, to, eight(out, to) - factor * a + turned * b)

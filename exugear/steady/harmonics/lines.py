@@ -573,6 +573,24 @@ class HarmonicCoupling:
         )
         return Terms(begin, size, room, np.array(first), places, conjugates, at_blocks)
 
+    @cached_property
+    def _of_constants(self) -> list[tuple[Integers, Integers]]:
+        """Lines at the frequencies of each group's harmonics, and which harmonic that is."""
+        found = []
+        for group in self.groups:
+            place, mirrored = self.lines.find(group.harmonics)
+            at = np.flatnonzero((place >= 0) & ~mirrored)
+            found.append((place[at], at))
+        return found
+
+    def of_constants(self, functions: Sequence[Complexes], values: Floats) -> Complexes:
+        """Products (n, k) of functions, as `of` takes them, with signals (k,) that are constant."""
+        found = np.zeros((len(self.lines.index), len(values)), dtype=complex)
+        for group, function, (lines, at) in zip(self.groups, functions, self._of_constants, strict=True):
+            own = slice(group.begin, group.begin + group.size)
+            np.add.at(found[:, own], lines, (function @ values[own])[at])
+        return found
+
     def memory(self) -> tuple[Floats, Floats]:
         """Allocate memory (lines times the size of all groups,) for products, real and imaginary parts."""
         size = len(self.lines.index) * int(self.terms.room.sum())
@@ -609,13 +627,15 @@ def flat(functions: Sequence[Complexes]) -> tuple[Floats, Floats]:
 
     One column after the other, rows filled up to whole octets.
     """
-    parts = []
-    for function in functions:
-        columns = np.zeros((*function.shape[:-2], function.shape[-1], _filled(function.shape[-2])), dtype=complex)
-        columns[..., : function.shape[-2]] = np.swapaxes(function, -1, -2)
-        parts.append(columns.ravel())
-    whole = np.concatenate(parts)
-    return np.ascontiguousarray(whole.real), np.ascontiguousarray(whole.imag)
+    shapes = [(*own.shape[:-2], own.shape[-1], _filled(own.shape[-2])) for own in functions]
+    ends = np.cumsum([math.prod(shape) for shape in shapes])
+    real, imaginary = np.zeros((2, ends[-1]))
+    for function, shape, end in zip(functions, shapes, ends, strict=True):
+        columns = np.swapaxes(function, -1, -2)
+        own = slice(end - math.prod(shape), end)
+        real[own].reshape(shape)[..., : columns.shape[-1]] = columns.real
+        imaginary[own].reshape(shape)[..., : columns.shape[-1]] = columns.imag
+    return real, imaginary
 
 
 @kernel

@@ -25,7 +25,7 @@ from exugear.steady.mean_system.rotating_frame import RotatingFrame
 from exugear.steady.mean_system.symmetric_carriers import SymmetricCarrier, symmetric_carrier
 from exugear.system.bearings.stiffness import load_stands_still, planet_supports, with_equal_planets
 from exugear.system.modes import state_matrix
-from exugear.system.statics import RIGID_BODY_LIMIT, BalanceError, static_state
+from exugear.system.statics import RIGID_BODY_LIMIT, BalanceError, Linearised, linearise, static_state
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.display import ReprMixin
@@ -109,8 +109,14 @@ class MeanSystem(ReprMixin):
     def at(self, values: Values, speed: float) -> Values:
         """Value (...) at a speed (rad/s) of what is known at the three, (3, ...): exact for parabolas."""
         weights = np.array([1.0, speed, speed**2]) @ self._parabola
-        found: Values = np.tensordot(weights, values, axes=1)
+        found: Values = (weights @ values.reshape(len(weights), -1)).reshape(values.shape[1:])
         return found
+
+    @cached_property
+    def elements(self) -> Linearised:
+        """Matrices of all elements in the static state at the middle one of the speeds."""
+        q, _, _ = self.frame.state(0.0, float(self.speeds[1]), self.static[1])
+        return linearise(self.frame.assembly, q, self.frame.mean_meshes)
 
     def stiffness_at(self, speed: float) -> Floats:
         """K (size, size) at a speed of the input, rad/s."""

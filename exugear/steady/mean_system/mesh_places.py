@@ -23,7 +23,7 @@ revolution follow from few samples of it.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -257,39 +257,85 @@ def group_of(family: Family, harmonics: int, forces: int, bases: int) -> Group:
     return Group(forces * family.first, forces * family.count, multiples.reshape(-1, bases))
 
 
-def coupled(
-    waves: MeshWaves, family: Family, spectra: Spectra, ports: MeshInterface, speed: float, forces: int
-) -> Complexes:
-    """Coefficients (q, forces of waves, readings of waves) at the harmonics of `group_of`, at a speed (rad/s).
+class CycleFunctions:
+    """Functions of the mesh cycles that lead to forces along a row from readings, as `HarmonicCoupling` takes them.
 
     Where no planets are out of phase, what each mesh is ahead in the static state counts to first order: it gives a
     mean wave to cosine and sine.
+
+    Parameters
+    ----------
+    spectra : harmonics of the functions
+    forces : number of forces, and of readings, of each wave
+    means : (m, forces), optional
+        What is subtracted from the mean that a wave has with itself, by its first wave.
     """
-    forward = waves.waves[family.first].sense * math.copysign(1.0, speed) > 0.0
-    cycles = np.array([values[family.first] for values in spectra.values()])
-    parts = (_place_coefficients if waves.carriers else _wave_coefficients)(family, cycles, ports, speed)
-    if not forward:  # the mesh runs through its cycle backwards, the carrier turns as it does
-        parts = parts[:, :, ::-1].conj()
-    harmonics = cycles.shape[1] - 1
-    found = np.zeros((2 * harmonics + 1, 2 * family.turns + 1, family.count, forces, family.count, forces), complex)
-    for (force, read), own in zip(spectra, parts, strict=True):
-        found[harmonics:, :, :, force, :, read] = own
-        found[:harmonics, :, :, force, :, read] = own[:0:-1, ::-1].conj()
-    return np.asarray(found.reshape(-1, family.count * forces, family.count * forces))
+
+    def __init__(
+        self, waves: MeshWaves, kinds: Sequence[Family], spectra: Spectra, forces: int, means: Floats | None = None
+    ) -> None:
+        self._forces = forces
+        self._means = None if means is None else [np.tile(means[own.first], own.count) for own in kinds]
+        self._by_place = bool(waves.carriers)
+        self._families = [(family, waves.waves[family.first].sense) for family in kinds]
+        self._spectra = []
+        self._of_waves = []
+        for family in kinds:
+            spectrum = _spectrum(spectra, family.first, forces)
+            own = np.einsum("qfr,vw->qvfwr", spectrum, np.eye(family.count))
+            self._spectra.append(spectrum)
+            self._of_waves.append(own.reshape(len(own), family.count * forces, family.count * forces))
+
+    def at(self, ports: MeshInterface, speed: float) -> list[Complexes]:
+        """Coefficients (q, forces of waves, readings of waves) by family at the harmonics of `group_of`.
+
+        `speed` is that of the input, rad/s.
+        """
+        found = []
+        for (family, sense), spectrum, of_waves in zip(self._families, self._spectra, self._of_waves, strict=True):
+            if self._by_place:
+                functions = self._by_places(family, spectrum, ports, speed)
+            else:
+                functions = self._by_waves(family, of_waves, ports)
+            # A mesh that runs through its cycle backwards; the carrier turns as it does.
+            if sense * speed < 0.0:
+                turns = functions.reshape(len(spectrum), -1, *functions.shape[1:])
+                functions = turns[:, ::-1].conj().reshape(functions.shape)
+            found.append(functions)
+        for functions, means in zip(found, self._means or (), strict=False):
+            np.einsum("ii->i", functions[len(functions) // 2])[...] -= means
+        return found
+
+    def _by_waves(self, family: Family, of_waves: Complexes, ports: MeshInterface) -> Complexes:
+        """Functions of each wave with itself, and of the mean wave to others."""
+        harmonics = len(of_waves) // 2
+        orders = 2j * math.pi * np.arange(-harmonics, harmonics + 1)[:, None, None]
+        ahead: Floats = np.zeros((family.count, self._forces, family.count, self._forces))
+        for force in range(self._forces):
+            ahead[:, force, 0, force] = ports.static[family.waves, POSITION]
+        to_others = of_waves @ ahead.reshape(of_waves.shape[1:])
+        return np.asarray(np.exp(orders * ports.positions[family.first]) * (of_waves + orders * to_others))
+
+    def _by_places(self, family: Family, spectrum: Complexes, ports: MeshInterface, speed: float) -> Complexes:
+        """Functions by all places, each as far ahead as in the static state, with multiples of the carrier's angle."""
+        factors = _place_factors(family, len(spectrum) // 2, ports, speed)
+        factors = np.concatenate([factors[:0:-1, ::-1].conj(), factors])
+        found = factors[:, :, :, None, :, None] * spectrum[:, None, None, :, None, :]
+        return found.reshape(-1, family.count * self._forces, family.count * self._forces)
 
 
-def _wave_coefficients(family: Family, cycles: Complexes, ports: MeshInterface, speed: float) -> Complexes:
-    """Coefficients (f, h + 1, 1, waves, waves) of each wave with itself, and of the mean wave to others."""
-    orders = 2j * math.pi * np.arange(cycles.shape[1])
-    turned = cycles * np.exp(orders * ports.positions[family.first])
-    found = np.zeros((*cycles.shape, 1, family.count, family.count), dtype=complex)
-    found[:, :, 0, range(family.count), range(family.count)] = turned[..., None]
-    found[:, :, 0, :, 0] += (orders * turned)[..., None] * ports.static[family.waves, POSITION]
+def _spectrum(spectra: Spectra, first: int, forces: int) -> Complexes:
+    """Harmonics (2 h + 1, forces, readings) of all functions over a mesh cycle, from -h to h."""
+    harmonics = next(iter(spectra.values())).shape[1] - 1
+    found = np.zeros((2 * harmonics + 1, forces, forces), dtype=complex)
+    for (force, read), values in spectra.items():
+        found[harmonics:, force, read] = values[first]
+    found[:harmonics] = found[:harmonics:-1].conj()
     return found
 
 
-def _place_coefficients(family: Family, cycles: Complexes, ports: MeshInterface, speed: float) -> Complexes:
-    """Coefficients (f, h + 1, turns, waves, waves) by all places, each as far ahead as the static state has it."""
+def _place_factors(family: Family, harmonics: int, ports: MeshInterface, speed: float) -> Complexes:
+    """Factors (h + 1, turns, waves, waves) of the harmonics by all places, each as far ahead as in the static state."""
     samples = SAMPLED * family.turns if family.carrier >= 0 else 1
     theta = 2.0 * math.pi * np.arange(samples) / samples
     there = wave_shapes(family.planets, speed, theta if family.carrier >= 0 else None, family.count)
@@ -299,7 +345,6 @@ def _place_coefficients(family: Family, cycles: Complexes, ports: MeshInterface,
         norms = family.planets.norms(family.count)
     back = np.swapaxes(there / norms, -1, -2)
     ahead = ports.positions[family.first] + np.array(family.ahead) + there @ ports.static[family.waves, POSITION]
-    turned = np.exp(2j * math.pi * np.arange(cycles.shape[1])[:, None, None] * ahead)
+    turned = np.exp(2j * math.pi * np.arange(harmonics + 1)[:, None, None] * ahead)
     between = (back * turned[:, :, None, :]) @ there
-    turns = np.fft.fft(between, axis=1)[:, np.arange(-family.turns, family.turns + 1)] / samples
-    return np.asarray(cycles[:, :, None, None, None] * turns)
+    return np.asarray(np.fft.fft(between, axis=1)[:, np.arange(-family.turns, family.turns + 1)] / samples)

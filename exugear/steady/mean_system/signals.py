@@ -19,6 +19,7 @@ from exugear.steady.mean_system.planet_sets import PlanetSet
 from exugear.steady.mean_system.standing_loads import GEAR_FORCE, GEAR_MOMENT, moment_supports, standing_gears
 from exugear.system.kernels.coordinates import TILT
 from exugear.system.modes import overall_row
+from exugear.system.signals import coupling_rows, turning_bodies
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Complexes, Floats, Integers, SingleComplexes
 
@@ -125,18 +126,15 @@ def signal_rows(system: MeanSystem, speed: float) -> SignalRows:
         place += [*(by_q @ t + speed * by_v @ t1)]
         rate += [*(by_v @ t)]
         acceleration += [*np.zeros_like(by_q)]
-    spins = np.eye(assembly.size)
-    ends = spins[assembly.springs.coordinates]
-    torques = (ends[:, 1] - ends[:, 0]) @ t
+    twisting, winding = coupling_rows(assembly)
     names += [_part(COUPLING_TORQUE, name) for name in assembly.spring_names]
-    place += [*(assembly.springs.stiffness[:, None] * torques)]
-    rate += [*(assembly.springs.damping[:, None] * torques)]
-    planets = {name for own in frame.sets for name in own.names}
-    turning = {name: at for name, at in assembly.spin.items() if name not in planets and frame.speeds.get(name)}
+    place += [*(twisting @ t)]
+    rate += [*(winding @ t)]
+    turning = turning_bodies(assembly.gearbox, assembly.spin)
     names += [_part(BODY_SPEED, name) for name in turning]
     place += [np.zeros(assembly.size)] * len(turning)
-    rate += [*(spins[list(turning.values())] @ t)]
-    acceleration += [np.zeros(assembly.size)] * (len(torques) + len(turning))
+    rate += [*t[[assembly.spin[name] for name in turning]]]
+    acceleration += [np.zeros(assembly.size)] * (len(twisting) + len(turning))
     return SignalRows(tuple(names), np.array(place), np.array(rate), np.array(acceleration))
 
 

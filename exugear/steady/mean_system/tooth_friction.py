@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from exugear.steady.harmonics.lines import HarmonicCoupling, LineSet, fourier_coefficients
-from exugear.steady.mean_system.mesh_places import MeshInterface, coupled, families, group_of
+from exugear.steady.mean_system.mesh_places import CycleFunctions, MeshInterface, families, group_of
 from exugear.steady.mean_system.mesh_waves import MeshWaves
 from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.system.tooth_mesh.element import friction_lack
@@ -55,12 +55,12 @@ def tooth_friction(waves: MeshWaves, lines: LineSet, ports: MeshInterface, speed
     gradients = np.stack([waves.gradients(rows[:, part], speed) for part in range(FRICTION_PARTS)], axis=1)
     weighted = gradients * waves.weights[:, None, None]
     spectra = {(part, 0): own for part, own in enumerate(cycles)}
-    everywhere = np.zeros((len(lines.index), len(elements), FRICTION_PARTS), dtype=complex)
-    everywhere[0, :, 0] = [wave.wave == 0 for wave in waves.waves]
+    everywhere = np.zeros((len(elements), FRICTION_PARTS))
+    everywhere[:, 0] = [wave.wave == 0 for wave in waves.waves]
     kinds = families(waves)
     coupling = HarmonicCoupling(
         lines, tuple(group_of(own, harmonics, FRICTION_PARTS, lines.index.shape[1]) for own in kinds)
     )
-    functions = [coupled(waves, own, spectra, ports, speed, FRICTION_PARTS) for own in kinds]
-    forces = coupling.of(functions, everywhere.reshape(len(everywhere), -1))
+    functions = CycleFunctions(waves, kinds, spectra, FRICTION_PARTS).at(ports, speed)
+    forces = coupling.of_constants(functions, everywhere.ravel())
     return np.asarray(forces @ weighted.reshape(-1, weighted.shape[2]))

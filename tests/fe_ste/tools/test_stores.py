@@ -14,7 +14,17 @@ import pytest
 import xarray as xr
 
 from fe_ste.tools import stores
-from fe_ste.tools.stores import FOLDER_VARIABLE, Arrays, Cache, Layout, Store, write_arrays, write_dataset, write_sealed
+from fe_ste.tools.stores import (
+    FOLDER_VARIABLE,
+    Arrays,
+    Cache,
+    Layout,
+    Store,
+    load_dataset,
+    write_arrays,
+    write_dataset,
+    write_sealed,
+)
 
 from ..damage import damages
 
@@ -47,6 +57,33 @@ def test_a_dataset_comes_back_with_its_key(store: Store) -> None:
     store.write_dataset(DATA)
     found = store.read_dataset(LAYOUT)
     assert found is not None and found.identical(DATA.assign_attrs(input_hash="this input"))
+
+
+def test_a_netcdf_file_is_read_as_xarray_reads_it(tmp_path: Path) -> None:
+    """Two readers of one file: texts, truth values, NaN, coordinates of other dimensions, dimensions without values."""
+    dataset = xr.Dataset(
+        {
+            "text": (("x",), np.array(["", "µm", "long name"]), {"long_name": "texts"}),
+            "empty_text": (("none",), np.zeros(0, dtype=str)),
+            "real": (("x", "free"), np.array([[1.0, np.nan]] * 3), {"units": "m", "range": np.array([0.0, 2.0])}),
+            "whole": ((), np.int64(3), {"factor": np.array([2.5])}),
+            "single": (("free",), np.ones(2, dtype=np.float32), {"flag": np.int32(1)}),
+            "true": (("x",), np.array([True, False, True])),
+        },
+        coords={"x": [0.0, 0.5, 1.0], "name": (("x",), np.array(["a", "b", "c"])), "scalar": 7.0},
+        attrs={"method_version": 3, "title": "numbers", "list": [1, 2]},
+    )
+    path = tmp_path / "numbers.nc"
+    write_dataset(path, dataset)
+    layout = Layout("numbers", 3, {"real": ("x", "free")}, ("title",))
+    for names in (None, ["real"], ["text", "whole"], ["x"]):
+        found = load_dataset(path, layout, names)
+        expected = xr.load_dataset(path, engine="h5netcdf")
+        expected = expected if names is None else expected[names]
+        assert found.identical(expected), names
+        assert {name: own.dtype.kind for name, own in found.variables.items()} == {
+            name: own.dtype.kind for name, own in expected.variables.items()
+        }
 
 
 def test_what_is_not_there_or_of_another_key_is_none_without_a_word(

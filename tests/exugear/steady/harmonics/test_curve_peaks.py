@@ -9,10 +9,10 @@ import pytest
 import scipy.optimize
 import scipy.signal
 
-from exugear.steady.harmonics.branches import predicted_top, standing_peaks
+from exugear.steady.harmonics.branches import predicted_tops, standing_peaks
 
-SIZE = partial(np.linalg.norm, axis=1)
-"""Height of values (n, signals)."""
+SIZE = partial(np.linalg.norm, axis=-1)
+"""Height of values (..., signals)."""
 
 
 def two_modes(x, second):
@@ -25,22 +25,31 @@ def test_a_curve_through_five_places_knows_the_top_of_the_response_of_two_modes(
     """In x such a response has four poles and two near: those far away bend it by less than 1e-3 here."""
     x = np.array([0.97, 0.985, 0.996, 1.008, 1.022])
     top = scipy.optimize.minimize_scalar(lambda at: -abs(two_modes(at, second)), bounds=(0.99, 1.01), method="bounded")
-    place, height = predicted_top(x, two_modes(x, second)[:, None], 2, SIZE)
-    assert place == pytest.approx(top.x, abs=1e-4)
-    assert height == pytest.approx(-top.fun, rel=1e-3)
+    place, height = predicted_tops(x[None], two_modes(x, second)[None, :, None], 2, SIZE)
+    assert place == pytest.approx([top.x], abs=1e-4)
+    assert height == pytest.approx([-top.fun], rel=1e-3)
 
 
 def test_several_signals_of_one_resonance_have_one_top():
     x = np.array([0.97, 0.985, 0.996, 1.008, 1.022])
     sizes = np.array([3.0, 4.0 * np.exp(0.5j)])
-    place, height = predicted_top(x, two_modes(x, 1.5)[:, None] * sizes, 2, SIZE)
-    alone, own = predicted_top(x, two_modes(x, 1.5)[:, None], 2, SIZE)
+    place, height = predicted_tops(x[None], two_modes(x, 1.5)[None, :, None] * sizes, 2, SIZE)
+    alone, own = predicted_tops(x[None], two_modes(x, 1.5)[None, :, None], 2, SIZE)
     assert (place, height) == (pytest.approx(alone, abs=1e-6), pytest.approx(5.0 * own, rel=1e-6))
+
+
+def test_tops_of_several_curves_are_those_of_each_alone():
+    """One of the curves rises no more between its neighbours, where the search of the others goes on."""
+    x = np.array([[0.97, 0.985, 0.996, 1.008, 1.022], [0.96, 0.98, 1.0, 1.02, 1.04], [0.95, 0.97, 0.99, 1.02, 1.05]])
+    values = two_modes(x, 1.5)[..., None]
+    together = np.array(predicted_tops(x, values, 2, SIZE))
+    alone = [np.ravel(predicted_tops(own[None], value[None], 2, SIZE)) for own, value in zip(x, values, strict=True)]
+    np.testing.assert_allclose(together.T, alone, rtol=1e-12)
 
 
 def test_a_top_beside_the_end_of_the_places_is_found_as_well():
     x = np.array([0.99, 1.008, 1.022, 1.05, 1.09])
-    place, height = predicted_top(x, two_modes(x, 1.5)[:, None], 1, SIZE)
+    place, height = predicted_tops(x[None], two_modes(x, 1.5)[None, :, None], 1, SIZE)
     assert place == pytest.approx(1.0, abs=2e-3)
     assert height > abs(two_modes(x[1], 1.5))
 
