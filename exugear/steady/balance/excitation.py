@@ -303,14 +303,12 @@ class HarmonicBalanceModel:
     @cached_property
     def bearing_moments(self) -> tuple[Integers, Integers]:
         """Non-linear bearings (k,) on what stands still, and places (k, 2) of their moments among the signals."""
-        if self.bearings is None:
-            return np.zeros(0, dtype=np.int64), np.zeros((0, 2), dtype=np.int64)
         standing = moment_supports(self.waves.assembly).tolist()
-        supports = [(n, wave.connectors[wave.wave]) for n, wave in enumerate(self.bearings.waves)]
-        found = [(n, standing.index(support)) for n, support in supports if support in standing]
-        bearings, places = np.array(found, dtype=np.int64).reshape(-1, 2).T
-        if not found:
-            return bearings, np.zeros((0, 2), dtype=np.int64)
+        waves = () if self.bearings is None else self.bearings.waves
+        supports = [(n, wave.connectors[wave.wave]) for n, wave in enumerate(waves)]
+        if not (found := [(n, standing.index(support)) for n, support in supports if support in standing]):
+            return np.zeros(0, dtype=np.int64), np.zeros((0, 2), dtype=np.int64)
+        bearings, places = np.array(found, dtype=np.int64).T
         first = [signal_name.quantity for signal_name in self.signal_names].index(SUPPORT_MOMENT)
         return bearings, np.asarray(first + len(AXES) * places[:, None] + np.arange(2))
 
