@@ -20,7 +20,8 @@ from functools import cached_property
 
 import numpy as np
 
-from exugear.steady.balance.excitation import HarmonicBalanceModel, Interface
+from exugear.steady.balance.excitation import HarmonicBalanceModel
+from exugear.steady.balance.interface import Interface
 from exugear.steady.balance.passing_planets import PassingPlanets
 from exugear.steady.harmonics.linear_solvers import solve_lines
 from exugear.steady.harmonics.lines import add_answered, flat
