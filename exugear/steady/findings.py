@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from exugear.gearbox.units import RPM
+from exugear.gearbox.variant import Variant
 from exugear.results.findings import Finding, check_finding
 from exugear.results.sound.over_speed import sound_over_speed
 from exugear.steady.peaks import STRAINED, bearing_swings, dynamic_load_ratios, pulls, tensile_fractions
@@ -154,7 +155,7 @@ def _models(data: xr.Dataset) -> Iterator[Finding]:
         yield Finding("warning", text, pull.share)
     turned = any(str(name).startswith("rotation of ") for name in data["base"].values)
     waves = any(str(name).endswith(" cosine") for name in data["mesh_wave"].values)
-    if LAWS[model].loses_contact and turned and waves and str(data.attrs["variant"]) != "rigid":
+    if LAWS[model].loses_contact and turned and waves and Variant.of(str(data.attrs["variant"])).has_bearings:
         text = "planets count at their mean under excitations: what unequal load sharing adds as they pass is left out "
         text += "(2 % of the orders of the GRC off resonances); leave the excitations out (--without NAME) to see its "
         text += "size, or use exugear run"

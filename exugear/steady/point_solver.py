@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from exugear.steady.balance.excitation import HarmonicBalanceModel, Interface
+from exugear.steady.balance.excitation import HarmonicBalanceModel
+from exugear.steady.balance.interface import Interface
 from exugear.steady.balance.nonlinear import (
     CHECKED,
     HarmonicResidual,

@@ -59,6 +59,7 @@ from exugear.system.tooth_mesh.element import MeshElement
 from exugear.system.tooth_mesh.laws.mesh_forces import add_mesh_forces, add_mesh_jacobian, mesh_state
 from exugear.system.tooth_mesh.laws.stiffness import pack
 from fe_ste.tools.arrays import Complexes, Floats, Integers
+from fe_ste.tools.bundles import cached_bundle
 from fe_ste.tools.display import ReprMixin
 from fe_ste.transmission_error.surface import SteSurface
 
@@ -154,13 +155,17 @@ class Assembly(ReprMixin):
     @cached_property
     def turning(self) -> dict[str, TurningBody]:
         """Elastic bodies in their own turning frame."""
-        time = self.gearbox.case.damping.body_time_s
         gravity = self.gearbox.case.gravity.acceleration_m_per_s2
         return {
-            name: TurningBody(body.reduced, time, gravity)
+            name: TurningBody(body.reduced, self.damping_time(name), gravity)
             for name, body in self.elastic_bodies.items()
             if body.reduced.frame == "carrier"
         }
+
+    def damping_time(self, name: str) -> float:
+        """Damping over stiffness of an elastic body, s."""
+        own = self.elastic_bodies[name].damping_time
+        return self.gearbox.case.damping.body_time_s if own is None else own
 
     @cached_property
     def turning_arrays(self) -> TurningArrays:
@@ -314,7 +319,7 @@ class Assembly(ReprMixin):
             elastic_slice = self.elastic_slices[name]
             f[elastic_slice] += body.forces(q[elastic_slice], v[elastic_slice])
         if self.modal is not None:
-            add_modal_damping(q, v, self.modal, modal_memory(self.modal), f)
+            add_modal_damping(q, v, cached_bundle(self.modal), modal_memory(self.modal), f)
         return f
 
     @cached_property

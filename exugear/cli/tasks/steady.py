@@ -79,7 +79,7 @@ def check_radiating_body(project: Project) -> None:
         raise BadInputError(
             f"--quantity sound_power: the variant {project.choice.variant} has no flexible housing; use --variant "
             'flexible, and give a fixed body a [bodies.NAME.solid] table and flexibility = "elastic" '
-            "([bodies.NAME.external] has no surface)"
+            "([bodies.NAME.external] needs recovery, the file of its surface)"
         )
 
 

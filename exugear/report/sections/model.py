@@ -203,6 +203,11 @@ def _elastic_words(material: ReportData) -> Iterator[str]:
         f"Flexible in the variant {assembly.variant}: {', '.join(parts)}; damping {1e6 * case.damping.body_time_s:g} "
         f"µs times the stiffness, modes listed up to {case.elasticity.band_Hz:g} Hz."
     )
+    for name, body in assembly.elastic_bodies.items():
+        if body.loss_factor:
+            yield f"{name}: loss factor {body.loss_factor:g} of its free modes instead."
+        elif body.damping_time is not None:
+            yield f"{name}: damping {1e6 * body.damping_time:g} µs times its stiffness instead."
     if assembly.turning and case.damping.modal_percent is not None:
         yield (
             f"Damping in the variant {assembly.variant}: {damping_in_words(assembly.gearbox.case.damping)}, because "

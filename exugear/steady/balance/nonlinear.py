@@ -17,7 +17,8 @@ from functools import cached_property
 
 import numpy as np
 
-from exugear.steady.balance.excitation import HarmonicBalanceModel, Interface
+from exugear.steady.balance.excitation import HarmonicBalanceModel
+from exugear.steady.balance.interface import Interface
 from exugear.steady.balance.response import Response, rates_of
 from exugear.steady.harmonics.branches import exponents, kicks_needed
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError, solve_lines

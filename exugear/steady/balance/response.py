@@ -20,11 +20,14 @@ from functools import cached_property
 
 import numpy as np
 
-from exugear.steady.balance.excitation import HarmonicBalanceModel, Interface
+from exugear.steady.balance.excitation import HarmonicBalanceModel
+from exugear.steady.balance.interface import Interface
 from exugear.steady.balance.passing_planets import PassingPlanets
 from exugear.steady.harmonics.linear_solvers import solve_lines
 from exugear.steady.harmonics.lines import add_answered, flat
+from exugear.steady.mean_system.bearing_waves import TILTS
 from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, POSITION, CycleFunctions, MeshInterface
+from exugear.system.kernels.meshes import TILT_DAMPING, TILT_STIFFNESS
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.bundles import cached_bundle
 from fe_ste.tools.octets import SIZE
@@ -357,6 +360,8 @@ def signals(model: HarmonicBalanceModel, response: Response) -> Complexes:
     if model.bearings is not None:
         beyond = response.excess[:, len(model.waves.waves) :, : model.bearing_signals.shape[1]]
         of_motion[:, model.bearing_signals] -= beyond
+        tilted, moments = model.bearing_moments
+        of_motion[:, moments] -= response.excess[:, len(model.waves.waves) + tilted, TILTS]
     levers = interface.ports.levers
     deflection = response.deflection
     if levers.any():
@@ -364,12 +369,31 @@ def signals(model: HarmonicBalanceModel, response: Response) -> Complexes:
         deflection[0] += levers[:, -1]
     if model.shaft_orders.sidebands:
         deflection = deflection - model.deviations(interface.speed)
-    found = [of_motion, deflection, response.force[:, model.waves.force_waves]]
+    found = [of_motion, deflection, response.force[:, model.waves.force_waves], _gear_loads(model, response)]
     if model.radiated is not None:
         # A line of a coefficient c oscillates with the amplitude 2 c.
         velocity = model.radiated.surface_velocity(2.0 * response.motion, interface.frequencies)
         found.append((0.5 * velocity[:, None]).astype(np.complex128))
     return np.concatenate(found, axis=1)
+
+
+def _gear_loads(model: HarmonicBalanceModel, response: Response) -> Complexes:
+    """Find the forces and moments (n, 6 gears) of the meshes on gears that stand still.
+
+    Of the model `table` only the forces along the line of action are included.
+    """
+    by_force, by_moment = model.gear_load_rows
+    found = response.force @ by_force
+    waves = model.waves
+    tilt = waves.assembly.meshes.tilt[[wave.first for wave in waves.waves]]
+    if by_moment.any() and tilt[:, TILT_STIFFNESS].any():
+        turned = response.motion @ model.misalignments_at(response.interface.speed).T
+        moment = tilt[:, TILT_STIFFNESS] * turned
+        moment += tilt[:, TILT_DAMPING] * rates_of(model, response.interface, turned)
+        if model.shuttles:
+            moment += response.excess[:, : len(waves.waves), MISALIGNMENT]
+        found += moment @ by_moment
+    return np.asarray(found)
 
 
 def dissipated_and_given(model: HarmonicBalanceModel, response: Response) -> tuple[float, float]:

@@ -345,7 +345,7 @@ def test_the_page_lists_excitations_and_deviations_among_its_assumptions_with_th
     assert "Excitations beside the gears, at the static torque: ripple (order 12 of shaft 1)." in assumptions
     assert "Excitations of the file that are left out: imbalance." in assumptions
     assert "Deviations of gears, pitch over one revolution: pinion on shaft 1 (eccentricity 5 µm)." in assumptions
-    assert "excitations.ripple: amplitude of 500 N m on shaft_1" in page
+    assert "excitations.ripple: amplitude of 500 N m on shaft 1" in page
 
 
 def test_a_continuation_under_an_excitation_is_refused_before_any_work(tmp_path, monkeypatch):
