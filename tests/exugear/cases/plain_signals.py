@@ -34,7 +34,7 @@ from exugear.system.kernels.rolling import (
 from exugear.system.kernels.table_law import scratch_memory
 from exugear.system.kernels.turning import set_turning_motion, turning_energies, turning_memory
 from exugear.system.modes import overall_row
-from exugear.system.signals import signal_layout
+from exugear.system.signals import signal_layout, turning_bodies
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.friction import friction_part, friction_size
 from exugear.system.tooth_mesh.laws.mesh_forces import pass_meshes
@@ -67,6 +67,12 @@ def sampled(assembly: Assembly, q: np.ndarray, v: np.ndarray) -> np.ndarray:
             row[layout["centre_distance_change"]] = centre - nominal
             row[layout["misalignment"]] = misalignment
             row[layout["outside_table"]] = assembly.mesh_states(x, u)[:, OUTSIDE]
+    if "coupling_torque" in layout:
+        stiffness, damping = assembly.springs.stiffness, assembly.springs.damping
+        twist, rate = (np.diff(own[:, assembly.springs.coordinates], axis=2)[..., 0] for own in (q, v))
+        out[:, layout["coupling_torque"]] = stiffness * twist + damping * rate
+    turning = turning_bodies(assembly.gearbox, assembly.spin)
+    out[:, layout["body_speed"]] = v[:, [assembly.spin[name] for name in turning]]
     return out
 
 
