@@ -10,9 +10,8 @@ import numpy as np
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.sections.entries import quantities
 from exugear.steady.balance.response import signals
-from exugear.steady.evaluation.comparison import ComparedCuts, harmonic_rows, transfers_of
+from exugear.steady.evaluation.comparison import ComparedCuts, harmonic_rows, swept_lines, transfers_of
 from exugear.steady.evaluation.fit import MOST_PARAMETERS
-from exugear.steady.evaluation.swept import swept_cut
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.settings import SteadySettings
 from exugear.system.system import Assembly
@@ -74,10 +73,5 @@ def response_levels(assembly: Assembly, cuts: ComparedCuts, settings: SteadySett
     amplitude = np.array([2.0 * signals(model, solver.response(float(own)))[places] for own in speeds])
     names = [signal.name for signal in model.signal_names]
     speed, transfer = transfers_of(cuts.run_up, names, speeds, cuts.lines, [amplitude.astype(np.complex64)])
-    windows = cuts.speed.size
-    found = np.full(cuts.measured.shape, np.nan)
-    for place, line in enumerate(cuts.lines):
-        own = swept_cut(speed, transfer[:, place], line.order, cuts.run_up.shaft, cuts.run_up.window, cuts.run_up.per)
-        count = min(own.shape[1], windows)
-        found[:, place, :count] = 20.0 * np.log10(np.abs(own[:, :count]))
-    return found
+    swept = swept_lines(speed, transfer, cuts.lines, cuts.run_up, cuts.speed.size)
+    return np.asarray(20.0 * np.log10(np.abs(swept)))

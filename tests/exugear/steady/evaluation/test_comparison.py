@@ -505,6 +505,24 @@ def test_the_written_file_has_the_fitted_numbers_and_the_deviation_of_the_fit(be
 
 
 @pytest.mark.validation
+def test_a_fit_that_cannot_be_made_leaves_the_comparison(bench: Bench, tmp_path: Path) -> None:
+    """One channel with one harmonic of two stages has two orders: the comparison is printed and stored, then code 1."""
+    part = slice(0, 90_000)
+    synthetic.recorded(tmp_path / "bench.h5", {"te": bench.signals["te"][part]}, bench.angle[part])
+    section = synthetic.measurement(harmonics=1, channels={"te": synthetic.CHANNELS["te"]})
+    path, copy = synthetic.gearbox_file(tmp_path, section), tmp_path / "new.toml"
+    fit = ("--fit", "housing.factor", "--write", copy)
+    outcome = exugear("measured", path, "--out", tmp_path / "r", *fit)
+    assert outcome.exit_code == 1
+    assert outcome.stdout.startswith("bench: computed levels within")
+    assert "Failed: fit: 2 orders of channels count; at least 4 are required" in " ".join(outcome.stderr.split())
+    assert (tmp_path / "r" / "bushing" / "line_of_action-discs" / "measured-bench.nc").is_file()
+    assert not copy.exists()
+    as_json = json.loads(exugear("measured", path, "--out", tmp_path / "r", *fit, "--json").stdout)
+    assert as_json["orders"] and "fit" not in as_json
+
+
+@pytest.mark.validation
 @pytest.mark.long
 def test_undetermined_numbers_are_not_written(bench: Bench, tmp_path: Path) -> None:
     """Below all resonances (600 to 850 rpm) damping changes nothing; results are still printed."""
