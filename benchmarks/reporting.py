@@ -9,6 +9,7 @@ from result_gears import grids_section, start_of, startup_section, tables_sectio
 from result_models import (
     bearings_section,
     elastic_section,
+    excitations_section,
     loads_section,
     report_section,
     steady_section,
@@ -28,6 +29,7 @@ SECTIONS = {
     "elastic": elastic_section,
     "bearings": bearings_section,
     "steady": steady_section,
+    "excitations": excitations_section,
     "loads": loads_section,
     "studies": studies_section,
     "report": report_section,

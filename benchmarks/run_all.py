@@ -76,6 +76,13 @@ def measure_steady(quick: bool) -> dict[str, Any]:
     return steady.measure(quick)
 
 
+def measure_excitations(quick: bool) -> dict[str, Any]:
+    """See `steady`."""
+    import steady
+
+    return steady.measure_excitations(quick)
+
+
 def measure_loads(quick: bool) -> dict[str, Any]:
     """See `loads`."""
     import loads
@@ -105,6 +112,7 @@ PARTS: dict[str, Callable[[bool], dict[str, Any]]] = {
     "elastic": measure_elastic,
     "bearings": measure_bearings,
     "steady": measure_steady,
+    "excitations": measure_excitations,
     "loads": measure_loads,
     "studies": measure_studies,
     "report": measure_report,

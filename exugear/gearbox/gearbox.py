@@ -46,7 +46,7 @@ from exugear.gearbox.reading import (
     shortened,
 )
 from exugear.gearbox.sections.case import NAMED_TABLES, GearboxFile, SteSection, labels_in_use
-from exugear.gearbox.sections.entries import unusual_values
+from exugear.gearbox.sections.entries import GROUND, unusual_values
 from exugear.gearbox.train import SpinConstraint, Train
 from exugear.gearbox.units import UM
 from fe_ste.flanks import FlankModification
@@ -407,6 +407,12 @@ class Gearbox(ReprMixin):
     def mounts(self) -> tuple[Bearing, ...]:
         """Supports of the gearbox on the ground, which are active if a fixed body is flexible."""
         return body_parts.mounts(self._origin)
+
+    @cached_property
+    def standing_bearings(self) -> tuple[Bearing, ...]:
+        """Bearings between a moving body and one that stands still, such as the housing or the ground."""
+        standing = {GROUND, *(body.name for body in self.bodies() if body.fixed)}
+        return tuple(own for own in self.bearings if own.on in standing and own.body not in standing)
 
     @cached_property
     def forces(self) -> tuple[PointForce, ...]:

@@ -12,11 +12,11 @@ REDUCTION = 2
 #: Eigenmodes (`exugear.system.modes`, and the models and matrices of `exugear.system.system`).
 MODES = 5
 #: Runs in time (`exugear.transient`, both solvers, the models, signals and filters).
-RUN = 11
+RUN = 12
 #: Life of gears and bearings (`exugear.life`, and the root stress of `fe_ste.root_stress`).
 LIFE = 10
 #: Steady-state responses (`exugear.steady`, and all methods that modes use).
-STEADY = 17
+STEADY = 19
 #: Comparisons with measured run-ups (`exugear.steady.evaluation`, `exugear.results.order_tracking`).
 MEASURED = 2
 #: Points of studies (`exugear.studies`: their outputs; the methods that these use have their own versions).

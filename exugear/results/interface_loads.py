@@ -1,11 +1,11 @@
-"""Forces of a steady-state response on what stands still, over frequency, as CSV and as Nastran load cards.
+"""Loads of a steady-state response on what stands still, over frequency, as CSV and as Nastran load cards.
 
 With them a structural department computes sound or stress by its own model of the housing. Conventions:
 
 - F(t) = Re(F exp(i omega t)): complex amplitudes are zero-to-peak, with the phase at angle zero of the overall input.
-- A positive force acts on the housing, along the axes of the gearbox.
-- Static forces are not included.
-- Moments are not included; bearings that resist tilting also transmit moments.
+- A positive force or moment acts on the housing, along or about the axes of the gearbox.
+- Moments are about the seat: the position of a bearing, or the middle of a gear on its axis.
+- Static loads are not included.
 """
 
 from __future__ import annotations
@@ -18,53 +18,51 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.parts import Bearing
-from exugear.gearbox.sections.entries import GROUND
 from exugear.gearbox.units import RPM
+from exugear.system.bodies.matrix_files.interface import UNIT_SYSTEMS, UnitSystemName
 from exugear.system.bodies.matrix_files.punch import nastran_decimal
 from fe_ste.tools.arrays import Complexes, Floats
 
 if TYPE_CHECKING:
     import xarray as xr
 
-SIGNAL = "support_force"
+OF_BEARINGS = ("support_force", "support_moment")
+OF_GEARS = ("gear_force", "gear_moment")
+"""Signals of force and moment: of bearings on their moving bodies, of gears on the fixed body itself."""
 AXES = ("x", "y", "z")
+DIRECTIONS = (*AXES, *(f"r{axis}" for axis in AXES))
+"""Forces along the axes, then moments about them: components 1 to 6 of a node in Nastran."""
 SAME_FREQUENCY = 1e-9
 """Relative difference below which two orders have one frequency; their amplitudes are added."""
 FIRST_SET = 1000
 """Set of DLOAD and FREQ in Nastran; sets of single loads and tables follow."""
-COLUMNS = ("speed_rpm", "order", "frequency_Hz", "seat", "node", "direction", "real_N", "imaginary_N")
+COLUMNS = ("speed_rpm", "order", "frequency_Hz", "seat", "node", "direction", "unit", "real", "imaginary")
 """Headings of the CSV file."""
 
 
 @dataclass(frozen=True, eq=False)
 class InterfaceLoads:
-    """Forces at one speed on what stands still."""
+    """Forces and moments at one speed on what stands still."""
 
     speed: float
     """Of the overall input, rad/s."""
     seats: tuple[str, ...]
-    """(s,) names of the bearings."""
+    """(s,) names of the bearings and gears."""
     nodes: tuple[int, ...]
     """(s,) node numbers."""
     order: Floats
     frequency: Floats
     """(l,) periods per revolution of the overall input, and Hz, ascending."""
-    force: Complexes
-    """(l, s, 3) amplitudes, N."""
+    load: Complexes
+    """(l, s, 6) amplitudes of the force along x, y, z (N), then of the moment about them (N m)."""
 
 
-def standing_supports(gearbox: Gearbox) -> tuple[Bearing, ...]:
-    """Bearings between a moving body and one that stands still, such as the housing or the ground.
-
-    Examples
-    --------
-    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
-    >>> [bearing.name for bearing in standing_supports(gearbox)][:3]
-    ['plc_a', 'plc_b', 'lss_a']
-    """
-    standing = {GROUND, *(body.name for body in gearbox.bodies() if body.fixed)}
-    return tuple(bearing for bearing in gearbox.bearings if bearing.on in standing and bearing.body not in standing)
+def loaded_seats(gearbox: Gearbox, data: xr.Dataset) -> tuple[str, ...]:
+    """Bearings on what stands still, then gears of fixed bodies, as far as a response has their loads."""
+    prefix = f"{OF_GEARS[0]} "
+    names = [str(name) for name in data["signal"].to_numpy()]
+    gears = dict.fromkeys(name.removeprefix(prefix).rsplit(" ", 1)[0] for name in names if name.startswith(prefix))
+    return (*(bearing.name for bearing in gearbox.standing_bearings), *gears)
 
 
 def interface_loads(
@@ -76,7 +74,7 @@ def interface_loads(
     ----------
     data : as `exugear.steady.steady_file.load_response` gives it
     points : indices of the speeds
-    numbers : node number by bearing
+    numbers : node number by seat, for those of `loaded_seats`
 
     Raises
     ------
@@ -84,31 +82,34 @@ def interface_loads(
         The response has no forces of these bearings: it belongs to another gearbox or variant.
     """
     names = [str(name) for name in data["signal"].to_numpy()]
-    supports = standing_supports(gearbox)
+    seats = loaded_seats(gearbox, data)
+    bearings = len(gearbox.standing_bearings)
     columns = []
-    for bearing in supports:
-        wanted = [f"{SIGNAL} {bearing.name} {axis}" for axis in AXES]
+    for place, seat in enumerate(seats):
+        signals = OF_BEARINGS if place < bearings else OF_GEARS
+        wanted = [f"{signal} {seat} {axis}" for signal in signals for axis in AXES]
         if not set(wanted) <= set(names):
-            raise ValueError(f"no forces of the bearing {bearing.name}; compute the response of this gearbox again")
+            raise ValueError(f"no loads of the bearing {seat}; compute the response of this gearbox again")
         columns += [names.index(name) for name in wanted]
     orders = data["order"].to_numpy()
     amplitude = data["amplitude"].to_numpy()[..., columns].astype(np.float64)
     phase = data["phase"].to_numpy()[..., columns].astype(np.float64)
-    # The signals are forces on the moving bodies; those of negative orders turn the other way.
-    force = -amplitude * np.exp(1j * np.where(orders < 0.0, -1.0, 1.0)[:, None] * phase)
+    # Signals of bearings are loads on the moving bodies; those of negative orders turn the other way.
+    sense = np.repeat(np.where(np.arange(len(seats)) < bearings, -1.0, 1.0), len(DIRECTIONS))
+    load = sense * amplitude * np.exp(1j * np.where(orders < 0.0, -1.0, 1.0)[:, None] * phase)
     group, members = _equal_orders(np.abs(orders))
     vibrating = group > 0.0  # the response is about the static state: the line of order zero is its change
     group, members = group[vibrating], [rows for rows, kept in zip(members, vibrating, strict=True) if kept]
     for point in points:
-        summed = np.array([force[point, rows].sum(axis=0) for rows in members])
+        summed = np.array([load[point, rows].sum(axis=0) for rows in members])
         speed = float(data["speed"].to_numpy()[point])
         yield InterfaceLoads(
             speed=speed,
-            seats=tuple(bearing.name for bearing in supports),
-            nodes=tuple(numbers[bearing.name] for bearing in supports),
+            seats=seats,
+            nodes=tuple(numbers[seat] for seat in seats),
             order=group,
             frequency=group * abs(speed) / (2.0 * np.pi),
-            force=summed.reshape(len(group), len(supports), 3),
+            load=summed.reshape(len(group), len(seats), len(DIRECTIONS)),
         )
 
 
@@ -129,39 +130,47 @@ def loads_csv(loads: Sequence[InterfaceLoads]) -> bytes:
     """Content of a CSV file with a row for each speed, order, seat and direction; see `COLUMNS`."""
     text = io.StringIO()
     text.write(",".join(COLUMNS) + "\n")
+    units = ["N"] * 3 + ["N m"] * 3
     for own in loads:
         for line, (order, frequency) in enumerate(zip(own.order, own.frequency, strict=True)):
             for seat, (name, node) in enumerate(zip(own.seats, own.nodes, strict=True)):
-                for axis, value in zip(AXES, own.force[line, seat], strict=True):
-                    start = f"{own.speed / RPM:.9g},{order:.9g},{frequency:.9g},{name},{node},{axis}"
+                for direction, unit, value in zip(DIRECTIONS, units, own.load[line, seat], strict=True):
+                    start = f"{own.speed / RPM:.9g},{order:.9g},{frequency:.9g},{name},{node},{direction},{unit}"
                     text.write(f"{start},{value.real:.9g},{value.imag:.9g}\n")
     return text.getvalue().encode()
 
 
-def nastran_loads(loads: InterfaceLoads) -> bytes:
+def nastran_loads(loads: InterfaceLoads, units: UnitSystemName = "SI") -> bytes:
     """Content of a bulk data file with the loads of one speed.
 
-    RLOAD1 has the real and imaginary part of each force over frequency (TABLED1), DAREA node and direction, DLOAD the
-    sum, FREQ the frequencies.
+    RLOAD1 has the real and imaginary part of each load over frequency (TABLED1) in N or N m, DAREA node, component and
+    the factor to the units of the model, DLOAD the sum, FREQ the frequencies.
+
+    Parameters
+    ----------
+    units : unit system of the model; frequencies are in Hz in all of them but mm-kg-ms, where they are in kHz
     """
-    frequency = [nastran_decimal(float(value)) for value in loads.frequency]
+    length, mass, time = UNIT_SYSTEMS[units]
+    force = mass * length / time**2
+    factors = [nastran_decimal(1.0 / own) for own in [force] * 3 + [force * length] * 3]
+    frequency = [nastran_decimal(float(value) * time) for value in loads.frequency]
     lines = [
-        f"$ Forces on the housing at {loads.speed / RPM:.6g} rpm of the overall input, N, zero-to-peak",
-        "$ F(t) = Re(F exp(i omega t)); axes of the gearbox; no moments",
+        f"$ Loads on the housing at {loads.speed / RPM:.6g} rpm of the overall input, zero-to-peak; model in {units}",
+        "$ Tables in N and N m; F(t) = Re(F exp(i omega t)); axes of the gearbox",
         f"$ Case control: DLOAD = {FIRST_SET}, FREQUENCY = {FIRST_SET}",
         *_wide_card("FREQ", [str(FIRST_SET), *frequency]),
     ]
     sets = []
     number = FIRST_SET
     for seat, node in enumerate(loads.nodes):
-        for axis in range(3):
-            values = loads.force[:, seat, axis]
+        for axis, direction in enumerate(DIRECTIONS):
+            values = loads.load[:, seat, axis]
             if not np.any(values):
                 continue
             number += 2
             sets.append(number)
-            lines.append(f"$ {loads.seats[seat]} {AXES[axis]}")
-            lines += _wide_card("DAREA", [str(number), str(node), str(axis + 1), "1.0"])
+            lines.append(f"$ {loads.seats[seat]} {direction}")
+            lines += _wide_card("DAREA", [str(number), str(node), str(axis + 1), factors[axis]])
             lines += _wide_card("RLOAD1", [str(number), str(number), "", "", str(number), str(number + 1)])
             for table, part in ((number, values.real), (number + 1, values.imag)):
                 cells = [cell for x, y in zip(frequency, part, strict=True) for cell in (x, nastran_decimal(float(y)))]

@@ -26,6 +26,8 @@ COMPARED = {
     "overall_dte": "overall transmission error",
     "mesh_force": "mesh forces",
     "support_force": "bearing forces",
+    "coupling_torque": "torques of couplings",
+    "body_speed": "speeds",
 }
 """Compared signals and their descriptions."""
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from exugear.gearbox.units import RPM
+from exugear.gearbox.variant import Variant
 from exugear.results.findings import Finding, check_finding
 from exugear.results.sound.over_speed import sound_over_speed
 from exugear.steady.peaks import STRAINED, bearing_swings, dynamic_load_ratios, pulls, tensile_fractions
@@ -35,6 +36,7 @@ LEAST_AMPLITUDE = 1e-12
 """Amplitude of the overall transmission error below which a response is round-off, m."""
 SHOWN_BEARINGS = 4
 SHOWN_ORDERS = 3
+SHOWN_SPEEDS = 6
 UPPER_ESTIMATE = (
     "sound power is an upper estimate (equivalent radiated power), too high at low frequency, for the GRC by 12 to "
     "14 dB at 63 Hz; housing modes shifted by 5 % change a single order by 8 to 10 dB"
@@ -130,6 +132,13 @@ def _speeds(data: xr.Dataset) -> Iterator[Finding]:
         first = f"{_rpm(missing[0]['speed'])}: {missing[0]['reason']}"
         text = f"no steady state found at {len(missing)} speeds (blank in the diagrams), first {first}"
         yield Finding("warning", text, len(missing))
+    if (at := np.abs(data["speed"].to_numpy()[data["loads_at_mean_angles"].to_numpy() == 1])).size:
+        shown = ", ".join(_rpm(speed) for speed in at[:SHOWN_SPEEDS])
+        more = f" and {at.size - SHOWN_SPEEDS} more" if at.size > SHOWN_SPEEDS else ""
+        text = f"excitations at the angles of the mean speed, without the vibration, at {shown}{more}: they turn their "
+        text += "bodies too far to settle, so sums and differences of their orders are missing there; add the inertia "
+        text += "of the connected machines, raise the lowest speed, or use exugear run"
+        yield Finding("warning", text, at.size)
     remarks = [(speed, str(text)) for speed, text in zip(data["speed"].values, data["remark"].values, strict=True)]
     if said := [(speed, text) for speed, text in remarks if text]:
         first = f"{_rpm(said[0][0])}: {said[0][1]}"
@@ -144,6 +153,13 @@ def _models(data: xr.Dataset) -> Iterator[Finding]:
         text += f"{100.0 * pull.share:.2g} % of the time at {_rpm(pull.speed)}; amplitudes there are invalid, because "
         text += f"the model {model} neglects contact loss; use {_in_time(data, ' --mesh-model table')}"
         yield Finding("warning", text, pull.share)
+    turned = any(str(name).startswith("rotation of ") for name in data["base"].values)
+    waves = any(str(name).endswith(" cosine") for name in data["mesh_wave"].values)
+    if LAWS[model].loses_contact and turned and waves and Variant.of(str(data.attrs["variant"])).has_bearings:
+        text = "planets count at their mean under excitations: what unequal load sharing adds as they pass is left out "
+        text += "(2 % of the orders of the GRC off resonances); leave the excitations out (--without NAME) to see its "
+        text += "size, or use exugear run"
+        yield Finding("warning", text)
     apart = float(np.max(np.nan_to_num(data["contact_loss_fraction"].to_numpy()), initial=0.0))
     if apart > 0.0:
         text = f"contact loss for up to {100.0 * apart:.2g} % of the time (included in the mesh model)"

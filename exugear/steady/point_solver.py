@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from exugear.steady.balance.excitation import HarmonicBalanceModel, Interface, LoadResponse
+from exugear.steady.balance.excitation import HarmonicBalanceModel
+from exugear.steady.balance.interface import Interface
 from exugear.steady.balance.nonlinear import (
     CHECKED,
     HarmonicResidual,
@@ -117,7 +118,8 @@ class ContactLossState:
         interface = interface or model.at(old.interface.speed)
         loads = old.interface.loads
         if loads is not None and model.shaft_orders.sidebands:
-            turned = LoadResponse(loads.loads[at[0].ravel()], loads.motion[at[0].ravel()], loads.torque)
+            own = at[0].ravel()
+            turned = replace(loads, loads=loads.loads[own], motion=loads.motion[own])
             interface = replace(interface, loads=turned)
         response = replace(
             old,

@@ -52,6 +52,7 @@ _LAYOUT = Layout(
         "drive_torque": ("point",),
         "energy_error": ("point",),
         "growth": ("point",),
+        "loads_at_mean_angles": ("point",),
         "remark": ("point",),
         "contact_loss_fraction": ("point", "mesh_wave"),
         "left_out": ("mesh_wave",),
@@ -112,6 +113,11 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
         "drive_torque": (("point",), solved.drive_torque, {"units": "N m"}),
         "energy_error": (("point",), solved.energy_error, {"units": "1"}),
         "growth": (("point",), solved.growth, {"units": "1/s", "long_name": "largest growth rate of a disturbance"}),
+        "loads_at_mean_angles": (
+            ("point",),
+            solved.mean_angles.astype(np.int8),
+            {"units": "1", "long_name": "1 where stated loads do not settle at the angles that include the vibration"},
+        ),
         "remark": (("point",), solved.remark.astype(object), {}),
         "left_out": (
             ("mesh_wave",),

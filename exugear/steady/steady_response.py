@@ -38,7 +38,14 @@ from exugear.steady.mean_system.mesh_places import DEFLECTION
 from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.mean_system.signals import SignalName
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
-from exugear.steady.settings import SteadySettings, check_deviations, check_law, check_ring, check_speeds
+from exugear.steady.settings import (
+    SteadySettings,
+    check_continuation,
+    check_deviations,
+    check_law,
+    check_ring,
+    check_speeds,
+)
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers, SingleComplexes, Texts
 from fe_ste.tools.display import ReprMixin, TitledRows, value_range
@@ -167,6 +174,9 @@ class SolvedPoints:
     mean."""
     growth: Floats
     """(points,) largest growth rate of a disturbance, 1/s, on a continuation and with contact loss; NaN elsewhere."""
+    mean_angles: Booleans
+    """(points,) whether stated loads are at the angles of the mean speed because they did not settle at those that the
+    vibration gives their bodies, with the method `nonlinear`."""
     remark: Texts
     """(points,) what is to be said of a point, or why there is none: its numbers are NaN then."""
 
@@ -307,6 +317,7 @@ def response_of(
     check_speeds(assembly.gearbox, settings.speeds)
     check_law(assembly.mesh_model, settings.method)
     check_deviations(assembly.gearbox, settings.method)
+    check_continuation(assembly.gearbox, settings.branches)
     check_ring(assembly, settings.method)
     even = settings.speeds.values
     model = harmonic_balance_model(assembly, even, settings.harmonics, settings.combinations)
@@ -530,6 +541,7 @@ def _empty(model: HarmonicBalanceModel, speeds: Floats) -> SolvedPoints:
         apart=np.zeros((points, len(model.waves.waves))),
         free=np.zeros((points, len(model.bearing_names))),
         growth=np.full(points, np.nan),
+        mean_angles=np.zeros(points, dtype=bool),
         remark=np.zeros(points, dtype=f"<U{LONGEST_WARNING}"),
     )
 
@@ -544,5 +556,7 @@ def _fill(out: SolvedPoints, n: int, model: HarmonicBalanceModel, response: Resp
     out.products[n] = response.products
     out.apart[n] = response.apart
     out.free[n] = response.free
+    loads = response.interface.loads
+    out.mean_angles[n] = loads is not None and loads.at_mean_angles
     least = max(RESOLVED * exchanged_power(response), 1e-300)
     out.energy_error[n] = (taken - given) / max(abs(taken), abs(given), least)

@@ -191,13 +191,21 @@ OVERALL = "overall_dte"
 
 
 def _settled(results: PointResults, signal: str) -> Floats:
-    """Return the values of a signal over time, without the beginning."""
-    if signal not in results.run.variables or results.run[signal].dims[:1] != ("time",):
+    """Return the values of a signal over time, without the beginning; ``coupling_torque shaft`` is one of several."""
+    name, _, part = signal.partition(" ")
+    if name not in results.run.variables or results.run[name].dims[:1] != ("time",):
         known = ", ".join(
             str(name) for name, variable in results.run.variables.items() if variable.dims[:1] == ("time",)
         )
         raise PointError(f"no signal {signal!r} over time; signals are {known}")
-    values = results.run[signal].to_numpy()
+    found = results.run[name]
+    if part:
+        dimensions = found.dims[1:]
+        parts = [str(own) for own in found[dimensions[0]].to_numpy()] if len(dimensions) == 1 else []
+        if part not in parts:
+            raise PointError(f"no signal {signal!r}; {nearest_names(part, parts)}")
+        found = found[:, parts.index(part)]
+    values = found.to_numpy()
     return np.asarray(values[int(SETTLING * len(values)) :], dtype=np.float64)
 
 
@@ -251,7 +259,7 @@ def _order_amplitudes(results: PointResults, signal: str, orders: list[float], s
     values = _settled(results, signal)
     time = results.run["time"].to_numpy()
     if values.ndim > 1:
-        raise PointError(f"signal {signal!r} exists for each mesh or support; orders require a single signal")
+        raise PointError(f"signal {signal!r} has several parts; orders require one, such as '{signal} NAME'")
     speed = np.abs(_settled(results, "input_speed"))
     rate = 1.0 / float(time[1] - time[0])
     angle = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))]) / rate

@@ -57,7 +57,7 @@ from exugear.studies.sampling import (
 from exugear.studies.sections import StudyError, StudyFile, parse_study, read_study_file
 from exugear.system.bearings.stiffness import elastic_names, mounts_at_work
 from exugear.system.build import assemble
-from exugear.system.signals import signals_of
+from exugear.system.signals import signals_of, turning_bodies
 from exugear.system.statics import BalanceError
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
@@ -218,7 +218,17 @@ def errors_of_signals(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choi
     """Report signals and orders that neither runs nor steady-state responses of this gearbox have."""
     tabled = choice.mesh_model == "table"
     jointed = choice.variant.spins_only
-    of_runs = [signal for signal in signals_of(tabled, jointed) if signal.stored and signal.dimensions[0] == "time"]
+    of_runs = [
+        signal
+        for signal in signals_of(tabled, jointed, bool(gearbox.couplings))
+        if signal.stored and signal.dimensions[0] == "time"
+    ]
+    parts = {
+        "mesh": [mesh.name for mesh in gearbox.meshes],
+        "coupling": [coupling.name for coupling in gearbox.couplings],
+        "body": turning_bodies(gearbox, [body.name for body in gearbox.bodies() if not body.fixed]),
+    }
+    named_parts = [f"{own.name} {part}" for own in of_runs for part in parts.get(own.dimensions[-1], ())]
     families = [mesh.family for mesh in gearbox.meshes]
     named = [output.options.get("signal", OVERALL) for output in kept.values() if output.quantity.needs == "steady"]
     steady = _steady_signals(gearbox, choice) if any(signal != OVERALL for signal in named) else []
@@ -227,14 +237,14 @@ def errors_of_signals(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choi
         if output.quantity.needs == "run":
             single = output.quantity.dimension != ""
             known = [of_run.name for of_run in of_runs if not single or len(of_run.dimensions) == 1]
-            if signal not in known:
+            if signal not in known and signal not in named_parts:
                 yield f"outputs.{name}.signal = {signal[:200]!r}: no such signal; there are {_listed(known)}"
         elif output.quantity.needs == "steady":
             if signal != OVERALL and named_amplitudes(steady, np.zeros(len(steady), complex), signal) is None:
                 places = dict.fromkeys(" ".join(name.split(" ")[:2]) for name in steady)
                 known = [*places, *(name for name in steady if name not in places)]
                 yield f"outputs.{name}.signal = {signal[:200]!r}: no such signal; {nearest_names(signal, known)}"
-            yield from _errors_of_line(name, output, families)
+            yield from _errors_of_line(name, output, [*families, *(body.name for body in gearbox.bodies())])
 
 
 def _steady_signals(gearbox: Gearbox, choice: Choice) -> list[str]:
@@ -253,13 +263,17 @@ def _steady_signals(gearbox: Gearbox, choice: Choice) -> list[str]:
     return []
 
 
-def _errors_of_line(name: str, output: Output, families: Sequence[str]) -> Iterator[str]:
+ORDER_WORDS = ("x", "+", "-", "rotation", "of", "in")
+"""Words in the names of orders beside those of meshes and bodies: ``2 x stage_1``, ``12 x rotation of rotor``."""
+
+
+def _errors_of_line(name: str, output: Output, parts: Sequence[str]) -> Iterator[str]:
     line = output.options.get("line")
-    unknown = [word for word in str(line).split() if not word.isdecimal() and word not in ("x", "+", "-", *families)]
+    unknown = [word for word in str(line).split() if not word.isdecimal() and word not in (*ORDER_WORDS, *parts)]
     if line is not None and (unknown or not line):
         yield (
-            f"outputs.{name}.line = {str(line)[:200]!r}: no such order; orders are such as {families[0]} and 2 x "
-            f"{families[0]}, of {_listed(list(dict.fromkeys(families)))}"
+            f"outputs.{name}.line = {str(line)[:200]!r}: no such order; orders are such as {parts[0]} and 2 x "
+            f"{parts[0]}, of {_listed(list(dict.fromkeys(parts)))}"
         )
 
 

@@ -188,8 +188,9 @@ def _travelling(
 
 
 def elastic_arrays(flexible: Mapping[str, ElasticBody], size: int, damping_time: float) -> ElasticArrays:
-    """Arrays of elastic bodies whose coordinates are the last of `size`; damping is `damping_time` (s) times stiffness.
+    """Arrays of elastic bodies whose coordinates are the last of `size`.
 
+    Damping is stiffness times the damping time of the body, by default `damping_time` (s).
     Those in turning frames are left out (`exugear.system.kernels.turning`). Each body falls into blocks that
     neither its mass nor its stiffness couples. Coordinates that turn with the body come first in their block; a body on
     the ground has no spin speed, and no gyroscopic forces.
@@ -200,6 +201,7 @@ def elastic_arrays(flexible: Mapping[str, ElasticBody], size: int, damping_time:
     parts: dict[str, list[Floats]] = {"stiffness": [], "mass": [], "inverse": [], "gyroscopic": []}
     spin = []
     momentum = []
+    times = []
     begin = size - sum(body.reduced.size for body in flexible.values())
     for flexible_body in flexible.values():
         body = flexible_body.reduced
@@ -215,6 +217,7 @@ def elastic_arrays(flexible: Mapping[str, ElasticBody], size: int, damping_time:
             if len(others) > 1:
                 raise VariantError(f"body {body.name}: gyroscopic forces couple one block to {len(others)} others")
             turning.append(len(blocks) + spinning)
+            times.append(damping_time if flexible_body.damping_time is None else flexible_body.damping_time)
             partner.append(len(blocks) + others[0] if others else -1)
             parts["stiffness"].append(body.stiffness[np.ix_(block, block)])
             parts["mass"].append(body.mass[np.ix_(block, block)])
@@ -242,7 +245,7 @@ def elastic_arrays(flexible: Mapping[str, ElasticBody], size: int, damping_time:
         inverse=flat["inverse"],
         across=np.cumsum([0, *(m.size for m in parts["gyroscopic"][:-1])]).astype(np.int64),
         gyroscopic=flat["gyroscopic"],
-        damping_time=np.full(len(blocks), damping_time),
+        damping_time=np.array(times),
     )
 
 

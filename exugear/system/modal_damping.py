@@ -7,6 +7,10 @@ has the stated damping ratio, or more where these dampers alone exceed it.
 Modes are those at the static load, as `exugear modes` lists them; with flexible bodies, those within their frequency
 band (`elasticity.band_Hz`). A flexible carrier turns with its planets, so that modes have no constant shapes; a model
 with one has the damping times.
+
+A fixed body from matrices with a loss factor eta has C = M Phi diag(eta w_i) Phi^T M of its own free modes Phi, with
+w_i their angular frequencies: at its natural frequency each dissipates eta times its strain energy per radian, as
+structural damping does. It is one of the dampers above.
 """
 
 from __future__ import annotations
@@ -30,6 +34,8 @@ from fe_ste.tools.arrays import Floats
 
 NAMED = 3
 """Modes that are named where none is near a frequency."""
+RIGID_MOTIONS = 6
+"""Free motions of a body, which come first among its modes."""
 TAKEN = 0.05
 """Permissible relative distance of a mode from its frequency in `modal_modes`."""
 
@@ -47,8 +53,9 @@ def with_modal_damping(assembly: Assembly, percent: float | None = None) -> Asse
         No mode is near a frequency of `modal_modes`.
     """
     section = assembly.gearbox.case.damping
+    of_bodies = structural_damping(assembly)
     if section.modal_percent is None:
-        return assembly
+        return replace(assembly, modal=_arrays(assembly, of_bodies)) if of_bodies.any() else assembly
     if percent is not None:
         section = DampingSection(modal_percent=percent)
     q = static_state(assembly).q
@@ -60,7 +67,7 @@ def with_modal_damping(assembly: Assembly, percent: float | None = None) -> Asse
         damped &= frequency <= assembly.gearbox.case.elasticity.band_Hz
     frequency = frequency[damped]
     shapes = modes[1][:, damped]
-    stated = np.einsum("im,ij,jm->m", shapes, linear.total_damping, shapes)
+    stated = np.einsum("im,ij,jm->m", shapes, linear.total_damping + of_bodies, shapes)
     wanted = 2.0 * damping_ratios(section, frequency) * 2.0 * np.pi * frequency
     columns = linear.mass @ shapes * np.sqrt(np.maximum(wanted - stated, 0.0))
     # Under preload the mode without stiffness differs from rolling by 1e-5; rolling itself is to have no damping.
@@ -72,9 +79,22 @@ def with_modal_damping(assembly: Assembly, percent: float | None = None) -> Asse
     rolling = np.array([assembly.rolling_velocity(still, speed) for speed in speeds]).T
     carried = linear.mass @ rolling
     columns -= carried @ np.linalg.solve(rolling.T @ carried, rolling.T @ columns)
-    result = replace(assembly, modal=_arrays(assembly, columns))
+    result = replace(assembly, modal=_arrays(assembly, columns @ columns.T + of_bodies))
     result.known_rest.append(q)  # nothing is damped at rest
     return result
+
+
+def structural_damping(assembly: Assembly) -> Floats:
+    """Return the damping matrix (size, size) of fixed bodies with a loss factor."""
+    damping = np.zeros((assembly.size,) * 2)
+    for name, body in assembly.elastic_bodies.items():
+        if body.loss_factor > 0.0:
+            squares, shapes = scipy.linalg.eigh(body.reduced.stiffness, body.reduced.mass)
+            momenta = body.reduced.mass @ shapes[:, RIGID_MOTIONS:]
+            rates = body.loss_factor * np.sqrt(squares[RIGID_MOTIONS:])
+            at = assembly.elastic_slices[name]
+            damping[at, at] = momenta * rates @ momenta.T
+    return damping
 
 
 def with_damping_times(gearbox: Gearbox) -> Gearbox:
@@ -164,13 +184,13 @@ def real_modes(mass: Floats, stiffness: Floats, motions: Floats) -> tuple[Floats
     return np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi), free @ vectors
 
 
-def _arrays(assembly: Assembly, columns: Floats) -> ModalArrays:
-    """Return the arrays for the kernel, with planets grouped by carrier."""
+def _arrays(assembly: Assembly, damping: Floats) -> ModalArrays:
+    """Return the arrays of a damping matrix (size, size) for the kernel, with planets grouped by carrier."""
     sets = planet_families(assembly.bodies)
     spins = [assembly.spin.get(str(planets[0].carrier), -1) for planets in sets]
     planets = [planet for family in sets for planet in family]
     return ModalArrays(
-        tiles=laid_out([symmetric_tiles(columns @ columns.T)])[0],
+        tiles=laid_out([symmetric_tiles(damping)])[0],
         frame=np.array(spins, dtype=np.int64),
         first=np.cumsum([0, *map(len, sets)]).astype(np.int64),
         planets=np.array([assembly.coordinates[planet.name] for planet in planets], dtype=np.int64).reshape(-1, 6),

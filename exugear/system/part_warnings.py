@@ -69,7 +69,7 @@ def part_warnings(gearbox: Gearbox) -> Iterator[str]:
     yield from shafts_on_one_bearing(gearbox)
     yield from _faces_in_bearings(gearbox)
     yield from _speed_limits(gearbox)
-    yield from _excitations(gearbox)
+    yield from excitation_warnings(gearbox)
 
 
 def _speed_limits(gearbox: Gearbox) -> Iterator[str]:
@@ -540,7 +540,7 @@ def _clear_tip_diameter(pair: GearPair, mate: Gear) -> float:
     return 2.0 * math.hypot(mate.base_radius, roll)
 
 
-def _excitations(gearbox: Gearbox) -> Iterator[str]:
+def excitation_warnings(gearbox: Gearbox) -> Iterator[str]:
     """Compare stated loads with static torques, with the inertia that they turn, and with the unbalanced mass."""
     slowest, fastest = operating_range(gearbox) or (0.0, 0.0)
     if not gearbox.varying_loads or fastest == 0.0:

@@ -10,13 +10,14 @@ orbit. Both follow from stored signals, so that runs of the variant `rigid` need
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from exugear.gearbox.gearbox import Gearbox
 from exugear.system.kernels.coordinates import BODY_SIZE, TILT
 from exugear.system.kernels.table_law import GUESSED, LEFT_TABLE
 from exugear.system.system import Assembly
@@ -152,6 +153,22 @@ SIGNALS = (
         kind="f4",
         filled_by=("observe_supports",),
         on_bearings=True,
+    ),
+    Signal(
+        "coupling_torque",
+        ("time", "coupling"),
+        "N m",
+        "torque of the coupling by its spring and damper",
+        sign_convention="positive: accelerates the first body about +z",
+        filled_by=("Observer.complete",),
+    ),
+    Signal(
+        "body_speed",
+        ("time", "body"),
+        "rad/s",
+        "speed of the body, of a flexible one at its main seat",
+        sign_convention="rotation about +z",
+        filled_by=("Observer.complete",),
     ),
     Signal(
         "tensile_time",
@@ -310,8 +327,10 @@ ENERGIES = tuple(name for name in BALANCE_TERMS if name not in POWERS)
 """Terms of the account that are observed as they are."""
 
 
-def signals_of(tabled: bool, jointed: bool = False) -> tuple[Signal, ...]:
+def signals_of(tabled: bool, jointed: bool = False, coupled: bool = True) -> tuple[Signal, ...]:
     """Rows of `SIGNALS` that a run with the law `table`, or with another, has on bearings, or on ideal joints.
+
+    Runs without couplings have no torques of these.
 
     Examples
     --------
@@ -319,7 +338,22 @@ def signals_of(tabled: bool, jointed: bool = False) -> tuple[Signal, ...]:
     True
     """
     laws = ("all", "table" if tabled else "bilateral")
-    return tuple(signal for signal in SIGNALS if signal.laws in laws and not (jointed and signal.on_bearings))
+    return tuple(
+        signal
+        for signal in SIGNALS
+        if signal.laws in laws
+        and not (jointed and signal.on_bearings)
+        and (coupled or "coupling" not in signal.dimensions)
+    )
+
+
+def turning_bodies(gearbox: Gearbox, names: Iterable[str]) -> tuple[str, ...]:
+    """Those of some bodies whose speed is a signal: all that turn in the gear train, but for planets in a carrier.
+
+    The speed of a planet is that of the mesh cycles of its gears, and has no place among shafts.
+    """
+    speeds = gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
+    return tuple(name for name in names if speeds.get(name) and gearbox.body(name).carrier is None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -328,7 +362,7 @@ class SignalLayout:
 
     Examples
     --------
-    >>> names = {"mesh": ("first", "second"), "support": ("pin",), "axis": AXES}
+    >>> names = {"mesh": ("first", "second"), "support": ("pin",), "axis": AXES, "coupling": (), "body": ("shaft",)}
     >>> layout = SignalLayout(SIGNALS, names, radius=0.1)
     >>> layout["mesh_force"], layout["support_force"]
     (slice(4, 6, None), slice(6, 9, None))
@@ -336,13 +370,13 @@ class SignalLayout:
     >>> layout.values("support_force", samples)
     array([[[ 6.,  7.,  8.]],
     <BLANKLINE>
-           [[24., 25., 26.]]])
+           [[25., 26., 27.]]])
     """
 
     signals: tuple[Signal, ...]
     """What a run holds of `SIGNALS`."""
     names: Mapping[str, tuple[str, ...]]
-    """Names along the dimensions ``mesh`` and ``support``."""
+    """Names along the dimensions ``mesh``, ``support``, ``coupling`` and ``body``."""
     radius: float
     """Base radius of the overall output gear, m."""
 
@@ -380,9 +414,9 @@ class SignalLayout:
 
         Examples
         --------
-        >>> names = {"mesh": tuple("abcdefgh"), "support": tuple("abcdefghijkl"), "axis": AXES}
-        >>> SignalLayout(signals_of(False), names, radius=0.1).sample_bytes
-        384
+        >>> names = {"mesh": tuple("abcdefgh"), "support": tuple("abcdefghijkl"), "axis": AXES, "body": ("shaft",)}
+        >>> SignalLayout(signals_of(False, coupled=False), names, radius=0.1).sample_bytes
+        392
         """
         stored = (signal for signal in self.signals if signal.is_sampled and signal.stored)
         return sum(np.dtype(signal.kind).itemsize * math.prod(self.shape(signal)) for signal in stored)
@@ -419,11 +453,18 @@ def signal_layout(assembly: Assembly) -> SignalLayout:
     """
     gearbox = assembly.gearbox
     joints = tuple(joint.name for joint in gearbox.joints) if assembly.variant.spins_only else ()
-    return SignalLayout(
-        signals_of(LAWS[assembly.mesh_model].signals_positions, assembly.variant.spins_only),
-        {"mesh": assembly.mesh_names, "support": assembly.connector_names or joints, "axis": AXES},
-        gearbox.output_radius,
-    )
+    couplings = assembly.spring_names
+    names = {"mesh": assembly.mesh_names, "support": assembly.connector_names or joints, "axis": AXES}
+    names |= ({"coupling": couplings} if couplings else {}) | {"body": turning_bodies(gearbox, assembly.spin)}
+    signals = signals_of(LAWS[assembly.mesh_model].signals_positions, assembly.variant.spins_only, bool(couplings))
+    return SignalLayout(signals, names, gearbox.output_radius)
+
+
+def coupling_rows(assembly: Assembly) -> tuple[Floats, Floats]:
+    """Rows (couplings, size) of the torque of each coupling by the coordinates and by the velocities."""
+    ends = np.eye(assembly.size)[assembly.springs.coordinates]
+    twist = ends[:, 1] - ends[:, 0]
+    return assembly.springs.stiffness[:, None] * twist, assembly.springs.damping[:, None] * twist
 
 
 def bodies_of_forces(assembly: Assembly) -> dict[str, str]:

@@ -93,7 +93,7 @@ def linearise(assembly: Assembly, q: Floats, meshes: MeshArrays | None = None) -
         matrix = np.zeros((assembly.size,) * 2)
         matrix[of_body, of_body] = assembly.elastic_bodies[name].reduced.stiffness
         stiffness[f"{name}_body"] = matrix
-        damping[f"{name}_body"] = assembly.gearbox.case.damping.body_time_s * matrix
+        damping[f"{name}_body"] = assembly.damping_time(name) * matrix
     return Linearised(assembly.mass_at(q), stiffness, damping, modal_matrix(q, assembly.modal))
 
 

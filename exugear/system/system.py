@@ -154,13 +154,17 @@ class Assembly(ReprMixin):
     @cached_property
     def turning(self) -> dict[str, TurningBody]:
         """Elastic bodies in their own turning frame."""
-        time = self.gearbox.case.damping.body_time_s
         gravity = self.gearbox.case.gravity.acceleration_m_per_s2
         return {
-            name: TurningBody(body.reduced, time, gravity)
+            name: TurningBody(body.reduced, self.damping_time(name), gravity)
             for name, body in self.elastic_bodies.items()
             if body.reduced.frame == "carrier"
         }
+
+    def damping_time(self, name: str) -> float:
+        """Damping over stiffness of an elastic body, s."""
+        own = self.elastic_bodies[name].damping_time
+        return self.gearbox.case.damping.body_time_s if own is None else own
 
     @cached_property
     def turning_arrays(self) -> TurningArrays:

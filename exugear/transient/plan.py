@@ -97,8 +97,10 @@ def check_disk(
         )
 
 
-def sample_bytes(meshes: int, supports: int, tabled: bool, jointed: bool = False) -> int:
-    """Return the size of one sample on disk, of a run with so many meshes and supports.
+def sample_bytes(
+    meshes: int, supports: int, tabled: bool, jointed: bool = False, couplings: int = 0, bodies: int = 0
+) -> int:
+    """Return the size of one sample on disk, of a run with so many meshes, supports, couplings and turning bodies.
 
     Parameters
     ----------
@@ -112,8 +114,9 @@ def sample_bytes(meshes: int, supports: int, tabled: bool, jointed: bool = False
     >>> sample_bytes(meshes=8, supports=12, tabled=False, jointed=True)
     240
     """
-    names = {"mesh": ("",) * meshes, "support": ("",) * supports, "axis": AXES}
-    return SignalLayout(signals_of(tabled, jointed), names, radius=1.0).sample_bytes
+    counts = {"mesh": meshes, "support": supports, "coupling": couplings, "body": bodies}
+    names = {"axis": AXES} | {dimension: ("",) * count for dimension, count in counts.items()}
+    return SignalLayout(signals_of(tabled, jointed, couplings > 0), names, radius=1.0).sample_bytes
 
 
 def too_fine(step: float, total: float, sample_rate: float) -> str:

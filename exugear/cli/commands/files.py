@@ -189,7 +189,7 @@ def export(
         typer.Option(
             "--loads",
             metavar="FILE.nc",
-            help="Write the forces of a steady-state response on the housing instead.",
+            help="Write forces and moments of a steady-state response on the housing instead.",
             show_default=False,
         ),
     ] = None,
@@ -205,7 +205,11 @@ def export(
     ] = "npz",
     units: Annotated[
         Literal["SI", "mm-t-s", "mm-kg-ms", "mm-kg-s", "inch-lbf-s"],
-        typer.Option("--units", metavar="NAME", help="Units of matrices: SI, mm-t-s, mm-kg-ms, mm-kg-s, inch-lbf-s."),
+        typer.Option(
+            "--units",
+            metavar="NAME",
+            help="Units of matrices and load cards: SI, mm-t-s, mm-kg-ms, mm-kg-s, inch-lbf-s.",
+        ),
     ] = "SI",
     to: Annotated[
         Path | None,
@@ -239,7 +243,7 @@ def export(
     if loads is not None:
         from exugear.cli.tasks.export import export_loads
 
-        export_loads(case, loads, speed, to, allow_dir, as_json, whole)
+        export_loads(case, loads, speed, units, to, allow_dir, as_json, whole)
         return
     if rexs is None:
         raise BadInputError("nothing to export; name a REXS file, a body with --matrices BODY, or --loads FILE.nc")

@@ -1,8 +1,8 @@
-"""The command `export` for other finite-element programs: matrices of a flexible body, and forces on the housing."""
+"""The command `export` for other finite-element programs: matrices of a flexible body, and loads on the housing."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,13 +15,15 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.results.findings import Finding
-from exugear.results.interface_loads import interface_loads, loads_csv, nastran_loads, standing_supports
+from exugear.results.interface_loads import interface_loads, loaded_seats, loads_csv, nastran_loads
+from exugear.results.sound.radiated_power import radiating_names
 from exugear.steady.steady_file import load_response
 from exugear.system.bearings.stiffness import elastic_names
 from exugear.system.bodies.external import interface_of
 from exugear.system.bodies.matrix_files.files import MatrixFormat, file_contents, keys_of
 from exugear.system.bodies.matrix_files.interface import UnitSystemName
 from exugear.system.bodies.of_gearbox import node_numbers
+from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.files import FileError, write_file
 
 FOLDER = "matrices"
@@ -49,7 +51,7 @@ def export_matrices(
     if body not in flexible:
         raise BadInputError(f"--matrices {body}: no such flexible body; flexible bodies are {', '.join(flexible)}")
     target = to or project.folder / FOLDER
-    keys = keys_of(body, form)
+    keys = keys_of(body, form, body in radiating_names(project.gearbox, Variant.flexible))
     _refuse_existing(target, keys.values())
     project.begin()
     reduced = project.bodies()[body].reduced
@@ -103,9 +105,16 @@ def export_matrices(
 
 
 def export_loads(
-    case: Path, response: Path, speed: float | None, to: Path | None, allow_dir: Path | None, as_json: bool, whole: bool
+    case: Path,
+    response: Path,
+    speed: float | None,
+    units: UnitSystemName,
+    to: Path | None,
+    allow_dir: Path | None,
+    as_json: bool,
+    whole: bool,
 ) -> None:
-    """Write the forces on the housing; with a speed also as Nastran load cards."""
+    """Write the loads on the housing; with a speed also as Nastran load cards."""
     folder = to or response.parent
     stem = f"{response.stem}-loads"
     names = [f"{stem}.csv", *([] if speed is None else [f"{stem}.bdf"])]
@@ -117,15 +126,14 @@ def export_loads(
         raise BadInputError(f"--loads {error}; name a file that exugear steady has written") from error
     speeds = data["speed"].to_numpy()
     points = range(len(speeds)) if speed is None else [_nearest(speeds, speed)]
-    numbers = _numbers(gearbox)
+    numbers = _numbers(gearbox, loaded_seats(gearbox, data))
     try:
         loads = list(interface_loads(gearbox, data, points, numbers))
     except ValueError as error:
         raise BadInputError(f"--loads {response}: {error}") from error
-    contents = [loads_csv(loads), *([] if speed is None else [nastran_loads(loads[0])])]
+    contents = [loads_csv(loads), *([] if speed is None else [nastran_loads(loads[0], units)])]
     write_together(folder, dict(zip(names, contents, strict=True)))
     rows = [{"seat": name, "node": numbers[name]} for name in loads[0].seats]
-    carrying = [body.name for body in gearbox.bodies() if body.fixed and body.wheels]
     Outcome(
         verdict=f"{len(rows)} seats, {len(loads[0].frequency)} frequencies, {len(loads)} speeds",
         summary={
@@ -135,13 +143,7 @@ def export_loads(
             "files": [str(folder / name) for name in names],
             "seats": rows,
         },
-        findings=[
-            Finding("note", "moments are not included; bearings that resist tilting also transmit moments"),
-            *(
-                Finding("warning", f"mesh forces on the gears of {name} are not included; apply them separately")
-                for name in carrying
-            ),
-        ],
+        findings=list(_left_out(gearbox, str(data.attrs["mesh_model"]), numbers)),
         path=folder / names[-1],
     ).show(as_json, whole)
 
@@ -176,13 +178,40 @@ def _nearest(speeds: np.ndarray, speed: float) -> int:
     return nearest
 
 
-def _numbers(gearbox: Gearbox) -> dict[str, int]:
-    """Node number of each bearing on what stands still: that of its seat on a flexible housing, or counted from 1."""
-    supports = standing_supports(gearbox)
-    numbers = {bearing.name: number for number, bearing in enumerate(supports, start=1)}
+def _left_out(gearbox: Gearbox, mesh_model: str, numbers: Mapping[str, int]) -> Iterator[Finding]:
+    """Say which loads on what stands still the files do not have."""
+    fixed = [body for body in gearbox.bodies() if body.fixed]
+    for body in fixed:
+        for gear in body.wheels:
+            if gear not in numbers:
+                yield Finding(
+                    "warning",
+                    f"loads of meshes on {gear}, a gear of flexible sectors on {body.name}, are not included; apply "
+                    "them separately",
+                )
+            elif LAWS[mesh_model].loses_contact:
+                yield Finding(
+                    "note",
+                    f"loads on {gear} are those along the line of action; moments by uneven load along the face are "
+                    f"not included with the mesh model {mesh_model}",
+                )
+            if gearbox.case.damping.tooth_friction:
+                yield Finding("note", f"friction of the teeth is not included in the loads on {gear}")
+    for name in dict.fromkeys(
+        own.excitation for own in gearbox.varying_loads if own.reaction_on in {body.name for body in fixed}
+    ):
+        yield Finding("warning", f"the reaction of excitations.{name} is not included; apply it separately")
+
+
+def _numbers(gearbox: Gearbox, seats: Sequence[str]) -> dict[str, int]:
+    """Node number of each seat: that on a flexible housing; others are counted from there, or from 1."""
+    numbers: dict[str, int] = {}
+    on = {bearing.name: bearing.on for bearing in gearbox.standing_bearings}
     for body in gearbox.bodies():
         section = gearbox.case.bodies[body.family]
         if body.fixed and (section.external is not None or section.solid is not None):
             at_seats = node_numbers(gearbox, body.name)
-            numbers |= {bearing.name: at_seats[bearing.name] for bearing in supports if bearing.on == body.name}
-    return numbers
+            own = (seat for seat in seats if seat in body.wheels or on.get(seat) == body.name)
+            numbers |= {seat: at_seats[seat] for seat in own if seat in at_seats}
+    others = (seat for seat in seats if seat not in numbers)
+    return numbers | {seat: number for number, seat in enumerate(others, start=max(numbers.values(), default=0) + 1)}

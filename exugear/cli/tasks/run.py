@@ -21,7 +21,7 @@ from exugear.results.findings import run_findings
 from exugear.results.folder import time_noted
 from exugear.results.run_file import PARTIAL_NAME, has_pieces, read_run
 from exugear.results.solver_comparison import SolverComparison
-from exugear.system.signals import BALANCE_TERMS, MESH_TIMES, energy_residual
+from exugear.system.signals import BALANCE_TERMS, MESH_TIMES, energy_residual, turning_bodies
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from exugear.transient.outcome import LimitError, Run, RunError
 from exugear.transient.plan import EXPECTATIONS, check_disk, check_duration, rate_for, sample_bytes
@@ -112,7 +112,9 @@ def _check_extent(project: Project, duration: float | None, sample_rate: float) 
     jointed = project.choice.variant.spins_only
     tabled = LAWS[project.choice.mesh_model].signals_positions
     supports = gearbox.joints if jointed else gearbox.bearings
-    size = sample_bytes(len(gearbox.meshes), len(supports), tabled, jointed)
+    bodies = turning_bodies(gearbox, [body.name for body in gearbox.bodies() if not body.fixed])
+    counts = len(gearbox.meshes), len(supports)
+    size = sample_bytes(*counts, tabled, jointed, len(gearbox.couplings), len(bodies))
     check_duration(gearbox, load_case, duration, sample_rate)
     check_disk(gearbox, load_case, project.folder, duration, sample_rate, sample_bytes=size)
 

@@ -30,6 +30,7 @@ from exugear.steady.settings import (
     Method,
     SpeedRange,
     SteadySettings,
+    check_continuation,
     check_deviations,
     check_law,
     check_speeds,
@@ -67,6 +68,7 @@ def settings_of_options(
     """Return the settings that the options state; raise an error if they are invalid for the project."""
     check_law(project.choice.mesh_model, method)
     check_deviations(project.gearbox, method)
+    check_continuation(project.gearbox, branches)
     check_speeds(project.gearbox, speeds)
     return SteadySettings(speeds, method, harmonics, branches=branches)
 
@@ -77,7 +79,7 @@ def check_radiating_body(project: Project) -> None:
         raise BadInputError(
             f"--quantity sound_power: the variant {project.choice.variant} has no flexible housing; use --variant "
             'flexible, and give a fixed body a [bodies.NAME.solid] table and flexibility = "elastic" '
-            "([bodies.NAME.external] has no surface)"
+            "([bodies.NAME.external] needs recovery, the file of its surface)"
         )
 
 
@@ -153,6 +155,11 @@ def summarise(
         "not_converged": [
             {"speed_rpm": point["speed"] / RPM, "reason": point["reason"]}
             for point in json.loads(data.attrs["not_converged"])
+        ],
+        "excitations_at_mean_angles_rpm": [
+            abs(float(speed)) / RPM
+            for speed, mean in zip(data["speed"].values, data["loads_at_mean_angles"].values, strict=True)
+            if mean
         ],
         "unstable_points": int((data["growth"] > 0.0).sum()),
         "largest_energy_error": float(abs(data["energy_error"]).max()),

@@ -142,8 +142,8 @@ class SolidSection(Section):
     """A body of arbitrary shape from a file in the folder of the gearbox file, in the axes of the gearbox.
 
     Geometry (.step, .stp, .brep, or the script .geo, which needs permission to run) is meshed with tetrahedra by gmsh;
-    a mesh (.msh, .inp, .vtu, .vtk) is used unchanged. `torque_seat` names the seat at which torques act. The keys of
-    `blanks` are seats.
+    a mesh (.msh, .inp, .bdf, .nas, .vtu, .vtk) is used unchanged. `torque_seat` names the seat at which torques act.
+    The keys of `blanks` are seats.
     """
 
     file: FileName
@@ -209,6 +209,12 @@ class ExternalSection(Section):
     """File with the stiffness matrix."""
     mass: FileName | None = None
     """File with the mass matrix."""
+    gyroscopic: FileName | None = None
+    """File with the gyroscopic matrix of a shaft per rad/s about +z of the gearbox, antisymmetric, both triangles."""
+    recovery: FileName | None = None
+    """File (.npz) with the outer surface of a fixed body and its motion by the coordinates, for its sound power."""
+    band_Hz: q.FrequencyHz | None = None
+    """Cut-off frequency of the modal coordinates, for the sound power; `elasticity.band_Hz` by default."""
     nodes: FileName | None = None
     """File with the positions of the nodes (.csv, .inp, .npz, .pch, .bdf), if the matrices have none."""
     stiffness_name: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,15}$")] | None = None
@@ -230,11 +236,17 @@ class ExternalSection(Section):
     """Mass according to the other program, which is compared."""
     stated_centre_mm: Point | None = None
     """Centre of mass according to the other program in the axes of the files, which is compared."""
+    loss_factor: q.LossFactor | None = None
+    """Structural damping of a fixed body: each free mode has the damping ratio loss_factor / 2."""
+    damping_time_s: q.DampingTimeS | None = None
+    """Ratio of damping to stiffness of this body; by default that of `damping.body_time_s`."""
     seats: dict[Name, ExternalSeatSection] = {}
     """Seats by gear, bearing or mount."""
 
     @model_validator(mode="after")
     def _files(self) -> ExternalSection:
+        if self.loss_factor is not None and self.damping_time_s is not None:
+            raise ValueError("set either loss_factor or damping_time_s")
         apart = (self.stiffness is not None, self.mass is not None)
         if self.file is not None and any(apart):
             raise ValueError("set either file, or stiffness and mass")
@@ -292,6 +304,10 @@ class BodySection(Section):
         if self.external is not None and self.flexibility == "ffrf":
             raise ValueError(
                 "flexibility 'ffrf' requires mass integrals, which matrices on nodes do not have; set 'elastic'"
+            )
+        if self.external is not None and self.external.loss_factor is not None and not self.fixed:
+            raise ValueError(
+                "external.loss_factor: damping ratios of single modes are for a fixed body; set damping_time_s"
             )
         if self.external is not None and (self.spin_only or self.carrier is not None):
             raise ValueError(

@@ -123,6 +123,9 @@ CouplingDamping = Annotated[float, Range(0.0, 1e9, (0.0, 1e7), "N m s/rad")]
 DampingTimeS = Annotated[
     float, Range(0.0, 1e-2, (0.0, 1e-3), "stiffness times it is the damping: 1 ms is critical at 320 Hz")
 ]
+LossFactor = Annotated[
+    float, Range(0.0, 1.0, (1e-4, 0.3), "share of the strain energy lost per radian; welded steel 0.001, bolted 0.02")
+]
 ModalPercent = Annotated[
     float, Range(0.01, 20.0, (0.3, 10.0), "percent of critical damping; measured gearboxes have 1 to 4 %")
 ]

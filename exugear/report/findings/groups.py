@@ -395,21 +395,25 @@ _Signals = Mapping[str, NDArray[Any]]
 """Variables of a run by name."""
 
 
+UNITS = {"coupling": "N m", "body": "rad/s"}
+"""Units of channels; of all others N."""
+
+
 @dataclass(frozen=True)
 class Channel:
     """Signal of a run-up or a steady-state response with its waterfall."""
 
     name: str
-    """Name of the bearing, joint or mesh."""
+    """Name of the bearing, joint, mesh or coupling, or of a body after ``speed``."""
     kind: str
-    """{"support", "mesh"}"""
+    """{"support", "mesh", "coupling", "body"}"""
     words: str
     """Label."""
     copies: int
     """Number of equal parts that it represents."""
     mean: float
-    """Mean force over the middle third of the run, N; for bearings that revolve with a carrier, the mean magnitude.
-    NaN for a steady-state response, which has dynamic parts only."""
+    """Mean over the middle third of the run; for bearings that revolve with a carrier, the mean magnitude. NaN for a
+    steady-state response, which has dynamic parts only."""
     axial: float
     """Mean axial force of a bearing over the same time, N; NaN for a mesh and for a steady-state response."""
     spectra: Waterfall
@@ -429,13 +433,34 @@ class DominantOrder:
 
 
 def channels_of(run: VariantRun, words: Labels, response: xr.Dataset | None) -> Iterator[Channel]:
-    """Compute the channels of a run-up, or of the steady-state response it represents, bearings and joints first."""
+    """Compute the channels of a run-up, or of the steady-state response it represents, bearings and joints first.
+
+    Torques of couplings and speeds of the bodies that these connect are among them.
+    """
     if response is not None:
         yield from _lines(response, words, float(run.spectra.frequency[-1]))
         return
     data, _ = read_run(run.path, ("time", "input_speed", "support", "mesh", "mesh_force", "support_force"))
     yield from _supports(data, run, words)
     yield from _meshes(data, run, words)
+    if words.coupled:
+        data, _ = read_run(run.path, ("time", "input_speed", "coupling", "body", "coupling_torque", "body_speed"))
+        yield from _couplings(data, run, words)
+
+
+def _couplings(data: _Signals, run: VariantRun, words: Labels) -> Iterator[Channel]:
+    bodies = [name for name in map(str, data["body"]) if name in words.coupled]
+    columns = {"coupling": list(map(str, data["coupling"])), "body": list(map(str, data["body"]))}
+    for kind, signal, names in (("coupling", "coupling_torque", columns["coupling"]), ("body", "body_speed", bodies)):
+        for name in names:
+            own = np.ascontiguousarray(data[signal][:, columns[kind].index(name)])
+            spectra = _waterfall(own, data, run, UNITS[kind])
+            yield Channel(_key(kind, name), kind, words.of(name), 1, float(_middle(own).mean()), math.nan, spectra)
+
+
+def _key(kind: str, name: str) -> str:
+    """Name of a channel; bodies and couplings may share one."""
+    return f"speed {name}" if kind == "body" else name
 
 
 def _supports(data: _Signals, run: VariantRun, words: Labels) -> Iterator[Channel]:
@@ -469,6 +494,8 @@ def _meshes(data: _Signals, run: VariantRun, words: Labels) -> Iterator[Channel]
 def _lines(response: xr.Dataset, words: Labels, highest: float) -> Iterator[Channel]:
     supports: dict[str, list[str]] = {}
     meshes: dict[str, list[str]] = {}
+    couplings: dict[str, list[str]] = {}
+    bodies: dict[str, list[str]] = {}
     for name in map(str, response["signal"].to_numpy()):
         quantity, _, rest = name.partition(" ")
         place, _, axis = rest.rpartition(" ")
@@ -476,12 +503,16 @@ def _lines(response: xr.Dataset, words: Labels, highest: float) -> Iterator[Chan
             supports.setdefault(place, []).append(name)
         elif quantity == "mesh_force":
             meshes[rest] = [name]
-    for kind, before, places in (("support", "", supports), ("mesh", "mesh ", meshes)):
+        elif quantity == "coupling_torque":
+            couplings[rest] = [name]
+        elif quantity == "body_speed" and rest in words.coupled:
+            bodies[rest] = [name]
+    for kind, places in (("support", supports), ("mesh", meshes), ("coupling", couplings), ("body", bodies)):
         for place, signals in places.items():
-            spectra = response_spectra(response, signals, highest, 1.0, "N")
+            spectra = response_spectra(response, signals, highest, 1.0, UNITS.get(kind, "N"))
             name, *wave = place.split(" ")
-            label = " ".join([before + words.of(name), *wave])
-            yield Channel(place, kind, label, 1, math.nan, math.nan, spectra)
+            label = " ".join([("mesh " if kind == "mesh" else "") + words.of(name), *wave])
+            yield Channel(_key(kind, place), kind, label, 1, math.nan, math.nan, spectra)
 
 
 def _standing_for(names: Sequence[str], swings: Floats, words: Labels) -> list[tuple[int, int]]:
@@ -499,12 +530,12 @@ def _middle(values: Floats) -> Floats:
     return values
 
 
-def _waterfall(values: Floats, data: _Signals, run: VariantRun) -> Waterfall:
+def _waterfall(values: Floats, data: _Signals, run: VariantRun, unit: str = "N") -> Waterfall:
     time = data["time"]
     speed = data["input_speed"]
     rate = (time.size - 1) / float(np.ptp(time))
     return waterfall(
-        values, speed, rate, window_length=run.spectra.window_length, overlap=OVERLAP, reference=1.0, unit="N"
+        values, speed, rate, window_length=run.spectra.window_length, overlap=OVERLAP, reference=1.0, unit=unit
     )
 
 

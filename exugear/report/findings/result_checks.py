@@ -15,6 +15,7 @@ from exugear.results.run_file import read_run
 from exugear.results.spectra.run_spectra import VariantRun
 from exugear.steady.findings import response_findings
 from exugear.system.modal_damping import damping_in_words
+from exugear.system.part_warnings import excitation_warnings
 from exugear.system.signals import BALANCE_TERMS, MESH_TIMES, energy_residual
 
 CHECKED_RESONANCES = 10
@@ -68,6 +69,7 @@ def validity_checks(context: Context, group: RunGroup) -> tuple[Finding, ...]:
         verdicts.append(
             Finding("warning", (f"one of {len(sets)} inertia sets ({', '.join(sets)}) is used; compare the others"))
         )
+    verdicts += [Finding("warning", text) for text in excitation_warnings(context.gearbox)]
     rated = case.operation.rated_speed_rpm
     fastest = float(run.spectra.speed.max()) / RPM
     if rated is None:

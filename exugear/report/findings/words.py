@@ -139,6 +139,11 @@ class Labels:
         return {*self.labels, *case.labels, *case.couplings, *case.joints}
 
     @cached_property
+    def coupled(self) -> set[str]:
+        """Bodies that couplings connect."""
+        return {body for coupling in self._gearbox.couplings for body in (coupling.first, coupling.second)}
+
+    @cached_property
     def _meshes(self) -> set[str]:
         return {mesh.name for mesh in self._gearbox.meshes}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
@@ -153,7 +153,40 @@ def _assumptions(material: ReportData) -> list[str]:
     ]
     if friction := case.damping.tooth_friction:
         listed.append(f"Friction of teeth in runs and steady-state responses: coefficient {friction:g}.")
-    return listed
+    return [*listed, *_deviation_words(material), *_excitation_words(material)]
+
+
+def _deviation_words(material: ReportData) -> Iterator[str]:
+    """List the gears with deviations."""
+    gears = []
+    for (body, gear), deviation in material.context.gearbox.deviations.items():
+        pitch = float(np.ptp(deviation.pitch)) if deviation.pitch.size else 0.0
+        sizes = {"pitch": pitch, "eccentricity": deviation.eccentricity}
+        parts = [f"{name} {1e6 * size:.3g} µm" for name, size in sizes.items() if size > 0.0]
+        gears.append(f"{material.words.of(gear)} on {material.words.of(body)} ({', '.join(parts)})")
+    if gears:
+        yield f"Deviations of gears, pitch over one revolution: {'; '.join(gears)}."
+
+
+def _excitation_words(material: ReportData) -> Iterator[str]:
+    """List the stated loads with body and orders, and those that are left out."""
+    context = material.context
+    orders: dict[tuple[str, str], set[float]] = {}
+    for load in context.gearbox.varying_loads:
+        orders.setdefault((load.excitation, load.body), set()).add(load.order)
+    acting = [
+        f"{material.words.of(name)} ({_several('order', sorted(own))} of {material.words.of(body)})"
+        for (name, body), own in orders.items()
+    ]
+    if acting:
+        yield f"Excitations beside the gears, at the static torque: {'; '.join(acting)}."
+    names = {name for name, _ in orders}
+    if without := [material.words.of(name) for name in context.gearbox.case.excitations if name not in names]:
+        yield f"Excitations of the file that are left out: {', '.join(without)}."
+
+
+def _several(word: str, numbers: Sequence[float]) -> str:
+    return f"{word}{'s' * (len(numbers) > 1)} {', '.join(f'{number:g}' for number in numbers)}"
 
 
 def _elastic_words(material: ReportData) -> Iterator[str]:
@@ -170,6 +203,11 @@ def _elastic_words(material: ReportData) -> Iterator[str]:
         f"Flexible in the variant {assembly.variant}: {', '.join(parts)}; damping {1e6 * case.damping.body_time_s:g} "
         f"µs times the stiffness, modes listed up to {case.elasticity.band_Hz:g} Hz."
     )
+    for name, body in assembly.elastic_bodies.items():
+        if body.loss_factor:
+            yield f"{name}: loss factor {body.loss_factor:g} of its free modes instead."
+        elif body.damping_time is not None:
+            yield f"{name}: damping {1e6 * body.damping_time:g} µs times its stiffness instead."
     if assembly.turning and case.damping.modal_percent is not None:
         yield (
             f"Damping in the variant {assembly.variant}: {damping_in_words(assembly.gearbox.case.damping)}, because "

@@ -124,6 +124,8 @@ SPAN = 80.0
 """Minimum stored span below the highest level, dB."""
 CHANNEL_LINES = 3
 """Number of spectral lines of another channel that are drawn as one."""
+QUANTITY = {"coupling": "Torque", "body": "Speed"}
+"""Quantities of channels; of all others the force."""
 CUTS_EVERY = 2
 """Stride of the frames in order cuts of other channels."""
 ALSO = 4
@@ -236,8 +238,8 @@ def _channel(material: ReportData, channel: Channel, drawn: Drawn) -> dict[str, 
     copies = f", 1 of {channel.copies}" if channel.copies > 1 else ""
     return {
         "name": channel.name,
-        "words": f"Force: {channel.words}{copies}",
-        "unit": "N",
+        "words": f"{QUANTITY.get(channel.kind, 'Force')}: {channel.words}{copies}",
+        "unit": spectra.unit,
         **_cells(material, level, spectra, _floor(spectra, count), knots, CHANNEL_STEP, CHANNEL_LINES),
         **_cuts(material, spectra, CUTS_EVERY),
     }

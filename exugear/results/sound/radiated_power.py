@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.sections.bodies import BodySection
 from exugear.gearbox.variant import Variant
 from exugear.system.bearings.stiffness import elastic_names
 from exugear.system.system import Assembly
@@ -87,7 +88,7 @@ def equivalent_power(velocity: Floats, area: float) -> Floats:
 
 
 def radiating_names(gearbox: Gearbox, variant: Variant) -> tuple[str, ...]:
-    """Names of the bodies of a gearbox whose sound power is computed: flexible solids that are fixed.
+    """Names of the bodies of a gearbox whose sound power is computed: flexible bodies with a surface that are fixed.
 
     Examples
     --------
@@ -99,8 +100,13 @@ def radiating_names(gearbox: Gearbox, variant: Variant) -> tuple[str, ...]:
     return tuple(
         body.name
         for body in gearbox.bodies()
-        if body.fixed and body.name in flexible and gearbox.case.bodies[body.family].solid is not None
+        if body.fixed and body.name in flexible and _has_surface(gearbox.case.bodies[body.family])
     )
+
+
+def _has_surface(section: BodySection) -> bool:
+    """Return whether a flexible body has an outer surface: a solid, or matrices with a recovery matrix."""
+    return section.solid is not None or (section.external is not None and section.external.recovery is not None)
 
 
 def radiated_power(assembly: Assembly) -> RadiatedPower | None:

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from exugear.results.sound.radiated_power import RadiatedPower, radiated_power
+from exugear.steady.balance.interface import Interface, LoadResponse
 from exugear.steady.harmonics.lines import (
     Group,
     HarmonicCoupling,
@@ -52,6 +53,7 @@ from exugear.steady.mean_system.mesh_waves import MeshWaves, mesh_waves
 from exugear.steady.mean_system.shaft_orders import Places, ShaftOrders, at_lines
 from exugear.steady.mean_system.signals import (
     AXES,
+    SUPPORT_MOMENT,
     SURFACE_VELOCITY,
     Quantity,
     SignalName,
@@ -61,6 +63,7 @@ from exugear.steady.mean_system.signals import (
     quantities_of,
     signal_rows,
 )
+from exugear.steady.mean_system.standing_loads import gear_load_rows, moment_supports
 from exugear.steady.mean_system.tooth_friction import tooth_friction
 from exugear.system.kernels.meshes import SPIN_1
 from exugear.system.tooth_mesh.laws.registry import LAWS
@@ -70,91 +73,6 @@ SAMPLES_PER_HARMONIC = 16
 """Minimum samples per mesh period over the harmonics, with contact loss: kinks need more than products of orders."""
 MOST_LINES = 500
 """Combinations up to which lines are looked for: those up to the eighth of three mesh frequencies, the 21st of two."""
-
-
-@dataclass(frozen=True, eq=False)
-class LoadResponse:
-    """Response to loads on the bodies beside the forces along the meshes' rows at one speed; n orders.
-
-    These are the friction of the teeth, stated loads, and those by which mesh forces act on gears with deviations.
-    """
-
-    loads: Complexes
-    """(n, size) generalized forces in the rotating frame, N and N m."""
-    motion: Complexes
-    """(n, size) motion under them."""
-    torque: float
-    """Mean torque of the drive that overcomes them, N m."""
-
-
-@dataclass(frozen=True, eq=False)
-class Interface:
-    """Meshes of a gearbox in the averaged system at one speed; m components, r readings, f forces, n orders.
-
-    Components of nonlinear bearings follow those of the meshes.
-    """
-
-    speed: float
-    """Of the overall input, rad/s."""
-    frequencies: Floats
-    """(n,) angular frequencies of the lines, rad/s."""
-    motion: Complexes
-    """(n, size, m, f) motion under a unit of each force, the waves' weights in it."""
-    ports: MeshInterface
-    """What the meshes read and push along."""
-    rows: SignalRows
-    """Signals from the motion."""
-    torque: float
-    """Of the drive in the static state, N m."""
-    torque_per_force: Floats
-    """(m, f) torque of the drive per steady force, N m/N."""
-    bearings: BearingMean | None
-    """Nonlinear bearings in the averaged system."""
-    loads: LoadResponse | None = None
-    """Response to loads beside the meshes' forces, if there are any."""
-
-    @cached_property
-    def static(self) -> Complexes:
-        """Readings (n, m, r) without forces of the meshes beyond the averaged system: static state and other loads."""
-        found = np.zeros((len(self.frequencies), *self.ports.static.shape), dtype=complex)
-        if self.loads is not None:
-            found += self.read(self.loads.motion)
-        found[0] += self.ports.static
-        return found
-
-    @cached_property
-    def deflection(self) -> Complexes:
-        """Deflections (n, m, m, f) under a unit of each force."""
-        return _taken(self.ports.readings[:, DEFLECTION], self.motion)
-
-    @cached_property
-    def deflection_per_force(self) -> Complexes:
-        """What laws along a row read along what they push along, (n, m f, m f), under a unit of each force."""
-        lines, waves, forces = self.motion.shape[0], *self.motion.shape[2:]
-        read = self.readings[:, :waves, :forces]
-        return np.ascontiguousarray(read).reshape(lines, waves * forces, waves * forces)
-
-    @cached_property
-    def readings(self) -> Complexes:
-        """All that the laws read (n, m, r, m, f) under a unit of each force."""
-        return self.read(self.motion)
-
-    def read(self, motion: Complexes) -> Complexes:
-        """Find what the laws read (n, m, r, ...) of a motion (n, size, ...)."""
-        found = _taken(self.ports.readings, motion)
-        if self.ports.rates is not None:
-            moving = 1j * self.frequencies.reshape(-1, *(1,) * (motion.ndim - 1)) * motion
-            found += _taken(self.ports.rates, moving)
-        return found
-
-
-def _taken(rows: Floats, motion: Complexes) -> Complexes:
-    """Products (n, ..., ...) of rows (..., size) with a motion (n, size, ...)."""
-    lines, size, *loads = motion.shape
-    # A row's numbers are real: so are the products with both parts of the motion.
-    parts = np.ascontiguousarray(motion).view(np.float64).reshape(lines, size, -1)
-    found = np.ascontiguousarray(rows).reshape(-1, size) @ parts
-    return np.asarray(found.view(np.complex128).reshape(lines, *rows.shape[:-1], *loads))
 
 
 @dataclass(frozen=True)
@@ -294,6 +212,32 @@ class HarmonicBalanceModel:
         supports = [wave.connectors[wave.wave] for wave in self.bearings.waves]
         first = [signal_name.quantity for signal_name in self.signal_names].index("support_force")
         return np.asarray(first + len(axes) * np.array(supports)[:, None] + axes)
+
+    @cached_property
+    def bearing_moments(self) -> tuple[Integers, Integers]:
+        """Non-linear bearings (k,) on what stands still, and places (k, 2) of their moments among the signals."""
+        standing = moment_supports(self.waves.assembly).tolist()
+        waves = () if self.bearings is None else self.bearings.waves
+        supports = [(n, wave.connectors[wave.wave]) for n, wave in enumerate(waves)]
+        if not (found := [(n, standing.index(support)) for n, support in supports if support in standing]):
+            return np.zeros(0, dtype=np.int64), np.zeros((0, 2), dtype=np.int64)
+        bearings, places = np.array(found, dtype=np.int64).T
+        first = [signal_name.quantity for signal_name in self.signal_names].index(SUPPORT_MOMENT)
+        return bearings, np.asarray(first + len(AXES) * places[:, None] + np.arange(2))
+
+    @cached_property
+    def gear_load_rows(self) -> tuple[Floats, Floats]:
+        """Loads of the gears that stand still per unit of each wave's force and moment, (m, 6 gears) each."""
+        return gear_load_rows(self.waves)
+
+    @cached_property
+    def _misalignments(self) -> Floats:
+        rows = self.waves.assembly.meshes.table.misalignment
+        return np.array([self.waves.gradients(rows, float(speed)) for speed in self.system.speeds])
+
+    def misalignments_at(self, speed: float) -> Floats:
+        """Rows (m, size) of the misalignments of the meshes' waves at a speed of the input, rad/s."""
+        return np.asarray(self.system.at(self._misalignments, speed))
 
     def places(self, speed: float, positions: Floats, angles: Floats) -> MeshPlaces:
         """Places where laws are evaluated, as `mesh_places` has them; those of bearings follow."""
@@ -537,6 +481,21 @@ class HarmonicBalanceModel:
         if self.shuttles:
             means[:, MISALIGNMENT] = self.ring_tilting[:, 0]
         return CycleFunctions(self.waves, self.families, self.cycle_tangents, forces, means)
+
+    @cached_property
+    def slopes_over_cycle(self) -> CycleFunctions:
+        """Derivative of the tangents by the position, N/m per cycle."""
+        return self.functions({(DEFLECTION, DEFLECTION): self._derivative * self.cycle_coefficients})
+
+    @cached_property
+    def pulls_over_cycle(self) -> CycleFunctions:
+        """Derivative of the forces that curves have without deflection by the position, N per cycle."""
+        return self.functions({(DEFLECTION, DEFLECTION): -self._derivative * self.cycle_pulls})
+
+    @property
+    def _derivative(self) -> Complexes:
+        """Derivative of harmonics (harmonics + 1,) by the position, 1 per cycle."""
+        return np.asarray(2j * np.pi * np.arange(self.harmonics + 1))
 
     @cached_property
     def given(self) -> CycleFunctions:

@@ -17,7 +17,8 @@ from functools import cached_property
 
 import numpy as np
 
-from exugear.steady.balance.excitation import HarmonicBalanceModel, Interface
+from exugear.steady.balance.excitation import HarmonicBalanceModel
+from exugear.steady.balance.interface import Interface
 from exugear.steady.balance.response import Response, rates_of
 from exugear.steady.harmonics.branches import exponents, kicks_needed
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError, solve_lines
@@ -410,7 +411,7 @@ def solve_turning(
     """Solve the balance with stated loads that turn with the vibration of their bodies; parameters of `solve_balance`.
 
     Where the loads do not settle, as near standstill where they turn the free gear train by more than a period, they
-    are at the angles of the mean speed.
+    are at the angles of the mean speed, and `LoadResponse.at_mean_angles` says so.
     """
     still = balance
     readings, products = solve_balance(balance, readings, enough)
@@ -430,7 +431,10 @@ def solve_turning(
         readings, took = solve_balance(balance, readings, enough)
         products += took
     readings, took = solve_balance(still, readings, enough)
-    return still, readings, products + took
+    loads = still.interface.loads
+    assert loads is not None
+    interface = replace(still.interface, loads=replace(loads, at_mean_angles=True))
+    return replace(still, interface=interface), readings, products + took
 
 
 def solve_balance(balance: HarmonicResidual, readings: Complexes, enough: float = BALANCED) -> tuple[Complexes, int]:

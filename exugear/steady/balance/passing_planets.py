@@ -22,7 +22,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from exugear.steady.balance.excitation import HarmonicBalanceModel, Interface
+from exugear.steady.balance.excitation import HarmonicBalanceModel
+from exugear.steady.balance.interface import Interface
 from exugear.steady.harmonics.lines import Group, HarmonicCoupling
 from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, CycleFunctions, Family
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers

@@ -20,11 +20,14 @@ from functools import cached_property
 
 import numpy as np
 
-from exugear.steady.balance.excitation import HarmonicBalanceModel, Interface
+from exugear.steady.balance.excitation import HarmonicBalanceModel
+from exugear.steady.balance.interface import Interface
 from exugear.steady.balance.passing_planets import PassingPlanets
 from exugear.steady.harmonics.linear_solvers import solve_lines
 from exugear.steady.harmonics.lines import add_answered, flat
+from exugear.steady.mean_system.bearing_waves import TILTS
 from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, POSITION, CycleFunctions, MeshInterface
+from exugear.system.kernels.meshes import TILT_DAMPING, TILT_STIFFNESS
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.bundles import cached_bundle
 from fe_ste.tools.octets import SIZE
@@ -131,39 +134,57 @@ def deviation_forces(model: HarmonicBalanceModel, interface: Interface) -> Compl
     return forces - model.coupling.of(beyond, errors.reshape(len(errors), -1)).reshape(forces.shape)
 
 
-def forces_of_positions(model: HarmonicBalanceModel, response: Response) -> Complexes:
-    """Find the forces (n, m, f) that meshes have because their positions in the cycle move with the shafts' orders, N.
+class MovingPositions:
+    """Forces that meshes have because their positions in the cycle move with the shafts' orders, at one speed.
 
     A change p of the position changes the force by p dF/dpmc. It makes the sidebands of mesh orders that a frequency
     modulation has.
     """
-    ports = response.interface.ports
-    speed = response.interface.speed
-    waves = model.waves
-    shape = len(model.lines.index), *ports.forces.shape[:2]
-    derivative = 2j * np.pi * np.arange(model.harmonics + 1)
-    deflection = np.zeros(shape, dtype=complex)
-    deflection[..., DEFLECTION] = response.deflection - model.deviations(speed)
-    slopes = {(DEFLECTION, DEFLECTION): derivative * model.cycle_coefficients}
-    changes = _products(model, model.functions(slopes), ports, speed, deflection)
-    if waves.loads.any():
-        pulls = {(DEFLECTION, DEFLECTION): -derivative * model.cycle_pulls}
-        changes += _products_of_constants(model, model.functions(pulls), ports, speed, _everywhere(model, ports))
-    lines, coupling = model.slow_shifts
-    positions = response.motion[lines] @ np.ascontiguousarray(ports.readings[: shape[1], POSITION].T)
-    if (2.0 * np.abs(positions)).sum(axis=0).max(initial=0.0) > LARGEST_SHIFT:
-        return np.zeros(shape, dtype=complex)
-    shifts = np.concatenate([positions, positions.conj()])
-    # What two signals of a family of planets multiply to: each wave by the mean of the other.
-    mean = [next(n for n, own in enumerate(waves.waves) if own.first == wave.first) for wave in waves.waves]
-    products = np.zeros((len(shifts), shape[1], shape[1]), dtype=complex)
-    for n, at in enumerate(mean):
-        products[:, n, n] = shifts[:, at]
-        products[:, n, at] = shifts[:, n]
-    functions = [products]
-    forces = np.zeros(shape, dtype=complex)
-    forces[..., DEFLECTION] = coupling.of(functions, changes[..., DEFLECTION])
-    return forces
+
+    def __init__(self, model: HarmonicBalanceModel, interface: Interface) -> None:
+        ports = interface.ports
+        self._model = model
+        self._interface = interface
+        self._shape = len(model.lines.index), *ports.forces.shape[:2]
+        self._slopes = model.slopes_over_cycle.at(ports, interface.speed)
+        waves = model.waves.waves
+        self._lines, self._coupling = model.slow_shifts
+        self._rows = np.ascontiguousarray(ports.readings[: self._shape[1], POSITION].T)
+        # What two signals of a family of planets multiply to: each wave by the mean of the other.
+        self._mean = [next(n for n, own in enumerate(waves) if own.first == wave.first) for wave in waves]
+
+    @cached_property
+    def _pulls(self) -> Complexes | float:
+        """Changes (n, m, f) of the forces that curves have without deflection, N per cycle."""
+        model = self._model
+        if not model.waves.loads.any():
+            return 0.0
+        ports = self._interface.ports
+        pulls = model.pulls_over_cycle
+        return _products_of_constants(model, pulls, ports, self._interface.speed, _everywhere(model, ports))
+
+    def forces(self, deflections: Complexes, excess: Complexes) -> Complexes:
+        """Find the forces (n, m, f) at deflections (n, m) under forces (n, m f) beyond the averaged system, N."""
+        model = self._model
+        interface = self._interface
+        found = np.zeros(self._shape, dtype=complex)
+        moving = interface.motion[self._lines].reshape(len(self._lines), self._rows.shape[0], -1)
+        motion = -(moving @ excess[self._lines, :, None])[..., 0]
+        if interface.loads is not None:
+            motion += interface.loads.motion[self._lines]
+        positions = motion @ self._rows
+        if (2.0 * np.abs(positions)).sum(axis=0).max(initial=0.0) > LARGEST_SHIFT:
+            return found
+        along = np.zeros(self._shape, dtype=complex)
+        along[..., DEFLECTION] = deflections - model.deviations(interface.speed)
+        changes = model.coupling.of(self._slopes, along.reshape(len(along), -1)).reshape(self._shape) + self._pulls
+        shifts = np.concatenate([positions, positions.conj()])
+        products = np.zeros((len(shifts), self._shape[1], self._shape[1]), dtype=complex)
+        for n, at in enumerate(self._mean):
+            products[:, n, n] = shifts[:, at]
+            products[:, n, at] = shifts[:, n]
+        found[..., DEFLECTION] = self._coupling.of([products], changes[..., DEFLECTION])
+        return found
 
 
 def _everywhere(model: HarmonicBalanceModel, ports: MeshInterface) -> Floats:
@@ -176,15 +197,6 @@ def _everywhere(model: HarmonicBalanceModel, ports: MeshInterface) -> Floats:
 def _varying(cycle: Complexes) -> Complexes:
     """Harmonics (m, h + 1) without the mean."""
     return np.asarray(cycle * (np.arange(cycle.shape[1]) > 0))
-
-
-def _products(
-    model: HarmonicBalanceModel, functions: CycleFunctions, ports: MeshInterface, speed: float, values: Complexes
-) -> Complexes:
-    """Products (n, m, f) of values (n, m, f) with functions of the mesh cycles."""
-    if not values.size:  # a train without meshes
-        return values
-    return model.coupling.of(functions.at(ports, speed), values.reshape(len(values), -1)).reshape(values.shape)
 
 
 def _products_of_constants(
@@ -201,7 +213,7 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
 
     The equations y = y_static - G (K y - given) of all lines are solved with readings as lengths, l y. Where gears have
     deviations, the position moves with the orders of their shafts, too: what that adds to the forces is given by the
-    solution before (`forces_of_positions`). Without meshes it is the response of the method `linear`.
+    solution before (`MovingPositions`). Without meshes it is the response of the method `linear`.
     """
     if not model.waves.waves:
         return linear_response(model, interface)
@@ -214,6 +226,7 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
     passing = balance.passing
     given = given_forces(model, interface) + deviation_forces(model, interface)
     moved = np.zeros_like(given)
+    positions = MovingPositions(model, interface) if repeated else None
     found = None
     products = 0
     for again in reversed(range(1 + (POSITIONS_REPEATED if repeated else 0))):
@@ -221,15 +234,16 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
         start = still - (answers @ whole[..., None])[..., 0]
         found, more = balance.solve(start, found)
         products += more
-        excess = (whole + balance.forces(found)).reshape(shape)
-        response = _response(model, interface, (found / lengths).reshape(shape)[..., DEFLECTION], excess, products)
-        if again:
-            moved = forces_of_positions(model, response)
+        excess = whole + balance.forces(found)
+        deflection = (found / lengths).reshape(shape)[..., DEFLECTION]
+        if again and positions is not None:
+            moved = positions.forces(deflection, excess)
         if again and model.ring is not None:
+            response = _response(model, interface, deflection, excess.reshape(shape), products)
             shifted = at_mean_positions(model, interface, response)
             balance = LineBalance(model, shifted, answers, passing)
             given = given_forces(model, shifted) + deviation_forces(model, shifted)
-    return response
+    return _response(model, interface, deflection, excess.reshape(shape), products)
 
 
 class LineBalance:
@@ -346,6 +360,8 @@ def signals(model: HarmonicBalanceModel, response: Response) -> Complexes:
     if model.bearings is not None:
         beyond = response.excess[:, len(model.waves.waves) :, : model.bearing_signals.shape[1]]
         of_motion[:, model.bearing_signals] -= beyond
+        tilted, moments = model.bearing_moments
+        of_motion[:, moments] -= response.excess[:, len(model.waves.waves) + tilted, TILTS]
     levers = interface.ports.levers
     deflection = response.deflection
     if levers.any():
@@ -353,12 +369,31 @@ def signals(model: HarmonicBalanceModel, response: Response) -> Complexes:
         deflection[0] += levers[:, -1]
     if model.shaft_orders.sidebands:
         deflection = deflection - model.deviations(interface.speed)
-    found = [of_motion, deflection, response.force[:, model.waves.force_waves]]
+    found = [of_motion, deflection, response.force[:, model.waves.force_waves], _gear_loads(model, response)]
     if model.radiated is not None:
         # A line of a coefficient c oscillates with the amplitude 2 c.
         velocity = model.radiated.surface_velocity(2.0 * response.motion, interface.frequencies)
         found.append((0.5 * velocity[:, None]).astype(np.complex128))
     return np.concatenate(found, axis=1)
+
+
+def _gear_loads(model: HarmonicBalanceModel, response: Response) -> Complexes:
+    """Find the forces and moments (n, 6 gears) of the meshes on gears that stand still.
+
+    Of the model `table` only the forces along the line of action are included.
+    """
+    by_force, by_moment = model.gear_load_rows
+    found = response.force @ by_force
+    waves = model.waves
+    tilt = waves.assembly.meshes.tilt[[wave.first for wave in waves.waves]]
+    if by_moment.any() and tilt[:, TILT_STIFFNESS].any():
+        turned = response.motion @ model.misalignments_at(response.interface.speed).T
+        moment = tilt[:, TILT_STIFFNESS] * turned
+        moment += tilt[:, TILT_DAMPING] * rates_of(model, response.interface, turned)
+        if model.shuttles:
+            moment += response.excess[:, : len(waves.waves), MISALIGNMENT]
+        found += moment @ by_moment
+    return np.asarray(found)
 
 
 def dissipated_and_given(model: HarmonicBalanceModel, response: Response) -> tuple[float, float]:

@@ -129,7 +129,7 @@ class MeshWaves:
     @cached_property
     def groups(self) -> tuple[tuple[tuple[int, ...], PlanetSet | None], ...]:
         """Meshes and planets of each family, in the order of the waves' families."""
-        return _groups(self.system.frame)
+        return mesh_groups(self.system.frame)
 
     @cached_property
     def carriers(self) -> tuple[tuple[str, Modulator], ...]:
@@ -354,7 +354,7 @@ def mesh_waves(system: MeanSystem, passing: int = 0, neighbours: int = NEIGHBOUR
     orders: list[float] = []
     names: list[list[str]] = []
     waves: list[MeshWave] = []
-    groups = _groups(frame)
+    groups = mesh_groups(frame)
     rings = [planets for meshes, planets in groups if planets is not None and frame.ring_waves(meshes[0])]
     for meshes, planets in groups:
         mesh = assembly.elements[meshes[0]].mesh
@@ -385,7 +385,7 @@ def mesh_waves(system: MeanSystem, passing: int = 0, neighbours: int = NEIGHBOUR
     )
 
 
-def _groups(frame: RotatingFrame) -> tuple[tuple[tuple[int, ...], PlanetSet | None], ...]:
+def mesh_groups(frame: RotatingFrame) -> tuple[tuple[tuple[int, ...], PlanetSet | None], ...]:
     """Meshes of each family of planets in the order of the planets, and single meshes."""
     found: dict[str, tuple[tuple[int, ...], PlanetSet | None]] = {}
     for m, element in enumerate(frame.assembly.elements):

@@ -16,8 +16,10 @@ import numpy as np
 from exugear.steady.mean_system.mean_system import MeanSystem, place_step
 from exugear.steady.mean_system.mesh_waves import MeshWaves, wave_name
 from exugear.steady.mean_system.planet_sets import PlanetSet
+from exugear.steady.mean_system.standing_loads import GEAR_FORCE, GEAR_MOMENT, moment_supports, standing_gears
 from exugear.system.kernels.coordinates import TILT
 from exugear.system.modes import overall_row
+from exugear.system.signals import coupling_rows, turning_bodies
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Complexes, Floats, Integers, SingleComplexes
 
@@ -47,12 +49,17 @@ BODY_SPEED = SignalName("body_speed", "body_speed", "rad/s")
 """Fluctuation of the speed of a body about its mean, about +z; of a flexible body at its main seat."""
 
 
+SUPPORT_MOMENT = "support_moment"
+"""Moment of a bearing on its body, about its seat, where the other body stands still."""
+
+
 @dataclass(frozen=True, eq=False)
 class SignalRows:
     """Rows that give signals from the motion u at one speed of the input: (A + i w B - w^2 C) u."""
 
     names: tuple[SignalName, ...]
-    """Of these rows: overall transmission error, bearing forces, seat accelerations, coupling torques, speeds."""
+    """Of these rows: overall transmission error, bearing forces, seat accelerations, moments, coupling torques,
+    speeds."""
     by_place: Floats
     by_rate: Floats
     by_acceleration: Floats
@@ -73,10 +80,16 @@ class SignalRows:
 
 
 def mesh_signal_names(waves: MeshWaves) -> tuple[SignalName, ...]:
-    """Names of transmission errors and forces of the meshes; forces of as many waves as there are planets."""
+    """Names of errors and forces of the meshes and of loads of gears; forces of as many waves as there are planets."""
     errors = tuple(SignalName(f"mesh_dte {wave.name}", "mesh_dte", "m") for wave in waves.waves)
     forces = tuple(SignalName(f"mesh_force {waves.waves[n].name}", "mesh_force", "N") for n in waves.force_waves)
-    return (*errors, *forces)
+    loads = tuple(
+        SignalName(f"{quantity} {gear} {axis}", quantity, units)
+        for gear in standing_gears(waves.assembly)
+        for quantity, units in ((GEAR_FORCE, "N"), (GEAR_MOMENT, "N m"))
+        for axis in AXES
+    )
+    return (*errors, *forces, *loads)
 
 
 def signal_rows(system: MeanSystem, speed: float) -> SignalRows:
@@ -92,26 +105,36 @@ def signal_rows(system: MeanSystem, speed: float) -> SignalRows:
     if assembly.supports:
         q, v, _ = frame.state(0.0, speed, system.static_at(speed))
         turn, labels = _support_waves(assembly, frame.sets)
-        by_q = turn @ _slopes(lambda step: _forces(assembly, q + step, v), assembly.size, place_step(assembly))
-        by_v = turn @ _slopes(lambda step: _forces(assembly, q, v + step), assembly.size, RATE_STEP)
+        all_by_q = _slopes(lambda step: _loads(assembly, q + step, v), assembly.size, place_step(assembly))
+        all_by_v = _slopes(lambda step: _loads(assembly, q, v + step), assembly.size, RATE_STEP)
+        count = 3 * len(assembly.supports)
+        by_q, by_v = turn @ all_by_q[:count], turn @ all_by_v[:count]
         seats = turn @ _seat_rows(assembly)
         for quantity, units in (("support_force", "N"), ("seat_acceleration", "m/s2")):
             names += [SignalName(f"{quantity} {label}", quantity, units) for label in labels]
         place += [*(by_q @ t + speed * by_v @ t1), *(speed**2 * seats @ t2)]
         rate += [*(by_v @ t), *(2.0 * speed * seats @ t1)]
         acceleration += [*np.zeros_like(by_q), *(seats @ t)]
-    spins = np.eye(assembly.size)
-    ends = spins[assembly.springs.coordinates]
-    torques = (ends[:, 1] - ends[:, 0]) @ t
+        standing = moment_supports(assembly)
+        names += [
+            SignalName(f"{SUPPORT_MOMENT} {assembly.supports[n].name} {axis}", SUPPORT_MOMENT, "N m")
+            for n in standing
+            for axis in AXES
+        ]
+        of_standing = (count + 3 * standing[:, None] + np.arange(3)).ravel()
+        by_q, by_v = all_by_q[of_standing], all_by_v[of_standing]
+        place += [*(by_q @ t + speed * by_v @ t1)]
+        rate += [*(by_v @ t)]
+        acceleration += [*np.zeros_like(by_q)]
+    twisting, winding = coupling_rows(assembly)
     names += [_part(COUPLING_TORQUE, name) for name in assembly.spring_names]
-    place += [*(assembly.springs.stiffness[:, None] * torques)]
-    rate += [*(assembly.springs.damping[:, None] * torques)]
-    planets = {name for own in frame.sets for name in own.names}
-    turning = {name: at for name, at in assembly.spin.items() if name not in planets and frame.speeds.get(name)}
+    place += [*(twisting @ t)]
+    rate += [*(winding @ t)]
+    turning = turning_bodies(assembly.gearbox, assembly.spin)
     names += [_part(BODY_SPEED, name) for name in turning]
     place += [np.zeros(assembly.size)] * len(turning)
-    rate += [*(spins[list(turning.values())] @ t)]
-    acceleration += [np.zeros(assembly.size)] * (len(torques) + len(turning))
+    rate += [*t[[assembly.spin[name] for name in turning]]]
+    acceleration += [np.zeros(assembly.size)] * (len(twisting) + len(turning))
     return SignalRows(tuple(names), np.array(place), np.array(rate), np.array(acceleration))
 
 
@@ -120,9 +143,10 @@ def _part(signal: SignalName, name: str) -> SignalName:
     return SignalName(f"{signal.name} {name}", signal.quantity, signal.units)
 
 
-def _forces(assembly: Assembly, q: Floats, v: Floats) -> Floats:
-    """Force on the body of each support along the global axes, (3 supports,), N."""
-    return -assembly.bearing_loads(q, v)[:, :3].ravel()
+def _loads(assembly: Assembly, q: Floats, v: Floats) -> Floats:
+    """Return forces (N), then moments (N m), on the bodies of all supports along the global axes, (6 supports,)."""
+    loads = -assembly.bearing_loads(q, v)
+    return np.concatenate([loads[:, :3].ravel(), loads[:, 3:].ravel()])
 
 
 def _slopes(function: Callable[[Floats], Floats], size: int, step: float) -> Floats:

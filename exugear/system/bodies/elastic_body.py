@@ -93,6 +93,10 @@ class ElasticBody(ReprMixin):
     """Its modes in a frame that floats with it, for a body that moves so in Exudyn."""
     file_digest: str | None = None
     """SHA-256 of the file of a solid."""
+    damping_time: float | None = None
+    """Damping over stiffness, s; that of the gearbox by default."""
+    loss_factor: float = 0.0
+    """Of a body on the ground: its free modes have half of it as their damping ratio, in place of a damping time."""
 
     def _line(self) -> str:
         more = f", {len(self.sectors)} gears on sectors" if self.sectors else ""

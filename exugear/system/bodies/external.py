@@ -7,8 +7,9 @@ rigid motions
     deformation alone, K <- D' K D with D = 1 - R R^+ and the rigid motions R of the nodes.
 gyroscopic forces
     A shaft in a frame that does not turn has the polar inertia of its torsional motion also as it tilts: the mass
-    matrix of the seats' spins couples their tilts about x and y. Of a carrier only the rigid part is known; in both,
-    `exugear.system.bodies.reduction.with_rigid_inertia` makes the rigid part exact.
+    matrix of the seats' spins couples their tilts about x and y, unless the file of a gyroscopic matrix is given. Of a
+    carrier only the rigid part is known; in both, `exugear.system.bodies.reduction.with_rigid_inertia` makes the rigid
+    part exact.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from exugear.system.bodies.matrix_files.interface import InterfaceMatrices, Unit
 from exugear.system.bodies.reduction import (
     BodySurface,
     Frame,
+    RadiatingSurface,
     ReducedBody,
     ReductionError,
     ReductionSummary,
@@ -43,6 +45,10 @@ SAME_PLACE = 1e-4
 """Largest distance of a node from the position of its seat, m."""
 FIRST_MODAL = 900_001
 """Number of the first modal coordinate that is written, above those of usual nodes."""
+LEAST_SKEW = 1e-6
+"""Largest symmetric part of a gyroscopic matrix over its largest entry."""
+LEAST_MOMENTUM = 0.05
+"""Largest difference of the gyroscopic coupling of rigid tilts from the polar inertia, over that."""
 MARK = 0.02
 """Size of the marks at the nodes in pictures over the extent of all nodes."""
 
@@ -72,6 +78,8 @@ class ExternalModel:
     seats: tuple[NodeSeat, ...]
     frame: Frame
     """Reference frame of the coordinates."""
+    band: float
+    """Highest frequency at which the file has modes, for the sound of its surface, Hz."""
     limit: float
     """Limit to which mass scaling lowers higher mode frequencies, Hz."""
     axis: tuple[float, float] = (0.0, 0.0)
@@ -90,7 +98,7 @@ class ExternalModel:
             "files": self.file_digest,
             "names": dict(self.files.names or {}),
             "seats": [asdict(seat) for seat in self.seats],
-            "rest": [self.name, self.units, self.rotation, self.shift, self.frame, self.limit, self.axis],
+            "rest": [self.name, self.units, self.rotation, self.shift, self.frame, self.limit, self.axis, self.band],
         }
         return hashlib.sha256(json.dumps(words, sort_keys=True).encode()).hexdigest()
 
@@ -122,7 +130,7 @@ def placed_matrices(model: ExternalModel) -> InterfaceMatrices:
     Raises
     ------
     ReductionError
-        A seat has no node, or shares one with another seat.
+        A seat has no node, or shares one with another seat; or the gyroscopic matrix is not that of the body.
     """
     matrices = matrices_of(model)[0].moved(np.array(model.rotation), model.shift)
     nodes = [_node_of(matrices, seat) for seat in model.seats]
@@ -133,7 +141,37 @@ def placed_matrices(model: ExternalModel) -> InterfaceMatrices:
                 f"seats.{model.seats[n].name}: node {matrices.nodes[node]} is also that of {first}; set same_as = "
                 f"{first!r}, or another node"
             )
+    _check_gyroscopic(matrices)
     return matrices.in_order([*nodes, *(node for node in range(len(matrices.nodes)) if node not in nodes)])
+
+
+def _check_gyroscopic(matrices: InterfaceMatrices) -> None:
+    """Refuse a gyroscopic matrix that is not antisymmetric, or not that of the rigid body in rigid motions.
+
+    A rotor with polar inertia J turning at Omega about +z has the moment -Omega J b' about x as it tilts at b' about y.
+    """
+    gyroscopic = matrices.gyroscopic
+    if gyroscopic is None:
+        return
+    largest = float(np.abs(gyroscopic).max())
+    lopsided = np.abs(gyroscopic + gyroscopic.T)
+    if lopsided.max() > LEAST_SKEW * largest:
+        row, column = divmod(int(lopsided.argmax()), matrices.size)
+        (node, component), (other, across) = matrices.labels[row], matrices.labels[column]
+        raise ReductionError(
+            f"gyroscopic: not antisymmetric at node {node}, component {component} and node {other}, component "
+            f"{across}: {gyroscopic[row, column]:.6g} and {gyroscopic[column, row]:.6g}; write both triangles, with "
+            "opposite signs"
+        )
+    motions = matrices.rigid_motions(matrices.positions.mean(axis=0))
+    polar = float(motions[:, SPIN] @ matrices.mass @ motions[:, SPIN])
+    coupling = float(motions[:, TILT] @ gyroscopic @ motions[:, TILT + 1])
+    if abs(coupling - polar) > LEAST_MOMENTUM * polar:
+        raise ReductionError(
+            f"gyroscopic: rigid tilts about x and y are coupled by {coupling:.5g} kg m2, but the polar inertia about z "
+            f"is {polar:.5g} kg m2; write the matrix per rad/s, for a rotation about +z of the gearbox, in "
+            "M q'' + Omega G q' + K q = f"
+        )
 
 
 def _node_of(matrices: InterfaceMatrices, seat: NodeSeat) -> int:
@@ -192,6 +230,11 @@ def reduce_external(model: ExternalModel) -> ReducedBody:
         spin=spin,
         frame=model.frame,
         modal_groups=("inner",) * len(matrices.modal),
+        radiating=(
+            None
+            if matrices.normal_motion is None
+            else RadiatingSurface(symmetric(matrices.normal_motion), matrices.area, matrices.area, model.band)
+        ),
         surface=marked_nodes(matrices.positions, matrices.size),
         summary=ReductionSummary({}, time.perf_counter() - began, {"whole": ()}, {"whole": mass_scaled}),
     )
@@ -207,6 +250,8 @@ def _without_rigid_energy(matrices: InterfaceMatrices) -> Floats:
 def _gyroscopic_matrix(matrices: InterfaceMatrices, frame: Frame) -> Floats:
     """Antisymmetric G of M q'' + Omega G q' + K q = f as far as mass and stiffness tell, (n, n)."""
     gyroscopic = np.zeros((matrices.size, matrices.size))
+    if matrices.gyroscopic is not None:
+        return 0.5 * (matrices.gyroscopic - matrices.gyroscopic.T)
     if frame == "nonrotating":
         spins = np.arange(SPIN, BODY_SIZE * len(matrices.nodes), BODY_SIZE)
         about_x, about_y = spins - SPIN + TILT, spins - SPIN + TILT + 1
@@ -253,7 +298,7 @@ def marked_nodes(positions: Floats, size: int) -> BodySurface:
 
 
 def interface_of(body: ReducedBody) -> InterfaceMatrices:
-    """Return mass and stiffness of a reduced body on its seats, for other programs; in SI units.
+    """Return mass, stiffness and surface of a reduced body on its seats, for other programs; in SI units.
 
     Nodes are numbered from 1 in the order of the seats. Modes above the limit of the body are at this limit.
 
@@ -272,4 +317,6 @@ def interface_of(body: ReducedBody) -> InterfaceMatrices:
         modal=tuple(range(FIRST_MODAL, FIRST_MODAL + len(body.modal_groups))),
         mass=body.mass,
         stiffness=body.stiffness,
+        normal_motion=None if body.radiating is None else body.radiating.matrix,
+        area=0.0 if body.radiating is None else body.radiating.area,
     )

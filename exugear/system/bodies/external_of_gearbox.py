@@ -40,6 +40,8 @@ class ExternalBody:
     main_seat: str
     sectors: Mapping[str, tuple[str, ...]]
     shared_seats: Mapping[str, str]
+    damping_time: float | None
+    loss_factor: float
     """As in `exugear.system.bodies.elastic_body.ElasticBody`."""
 
 
@@ -63,6 +65,10 @@ def external_body(gearbox: Gearbox, name: str) -> ExternalBody:
             f"bodies.{body.family}.flexibility = 'nonrotating': the body carries planets and is described in its own "
             "rotating frame; set 'elastic'"
         )
+    if external.gyroscopic is not None and frame != "nonrotating":
+        raise gearbox.error(f"{key}.gyroscopic: only shafts, in a frame that does not turn, have one; remove it")
+    if external.recovery is not None and frame != "ground":
+        raise gearbox.error(f"{key}.recovery: only fixed bodies radiate sound here; remove it")
     seats, sectors, shared = _seats(gearbox, body, external)
     names = [seat.name for seat in seats]
     if external.torque_seat is not None and external.torque_seat not in names:
@@ -77,9 +83,13 @@ def external_body(gearbox: Gearbox, name: str) -> ExternalBody:
         seats=tuple(seats),
         frame=frame,
         limit=gearbox.case.elasticity.limit_Hz,
+        band=external.band_Hz or gearbox.case.elasticity.band_Hz,
         axis=body.axis,
     )
-    return ExternalBody(model, external.torque_seat or names[0], sectors, shared)
+    damping_time, loss_factor = external.damping_time_s, external.loss_factor or 0.0
+    if loss_factor:
+        damping_time = 0.0
+    return ExternalBody(model, external.torque_seat or names[0], sectors, shared, damping_time, loss_factor)
 
 
 def _files(gearbox: Gearbox, key: str, external: ExternalSection) -> MatrixFiles:
@@ -97,6 +107,8 @@ def _files(gearbox: Gearbox, key: str, external: ExternalSection) -> MatrixFiles
         mass=path("mass", external.mass),
         nodes=path("nodes", external.nodes),
         names=names,
+        gyroscopic=path("gyroscopic", external.gyroscopic),
+        recovery=path("recovery", external.recovery),
     )
 
 
@@ -243,7 +255,7 @@ def external_warnings(gearbox: Gearbox, name: str) -> Iterator[str]:
     spare = placed.nodes[len(external.model.seats) :]
     if spare:
         yield f"{key}: nodes {', '.join(map(str, spare))} carry nothing and remain free"
-    if external.model.frame == "nonrotating":
+    if external.model.frame == "nonrotating" and placed.gyroscopic is None:
         yield (
             f"{key}: gyroscopic forces follow from the torsional inertia of the seats; frequencies of shafts came out "
             "within 0.03 %"

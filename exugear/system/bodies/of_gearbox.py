@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -487,7 +487,10 @@ def _elastic_body(gearbox: Gearbox, body: Body, folder: Path | None) -> ElasticB
     floating = None if floating is None else with_inertia(floating, wanted)
     inertia = of_shape.rigid_inertia
     if seated is not None:
-        return ElasticBody(reduced, inertia, seated.main_seat, seated.sectors, seated.shared_seats, floating, digest)
+        found = ElasticBody(reduced, inertia, seated.main_seat, seated.sectors, seated.shared_seats, floating, digest)
+        if isinstance(seated, ExternalBody):
+            found = replace(found, damping_time=seated.damping_time, loss_factor=seated.loss_factor)
+        return found
     seats = [seat.name for seat in of_shape.seats]
     shared = shared_seats(gearbox, body.name)
     torque = shared.get(TORQUE_SEAT, TORQUE_SEAT)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib
+import io
 import signal
 import tempfile
 import threading
@@ -29,9 +30,12 @@ CAD = {".step": "step", ".stp": "step", ".brep": "brep"}
 """Formats of shapes that hold nothing to run, by the ending of the file."""
 GEOMETRY = (SCRIPT, *CAD)
 """Endings of files that gmsh meshes."""
-MESHES = {".msh": "gmsh", ".inp": "abaqus", ".vtu": "vtu", ".vtk": "vtk"}
-"""Formats of meshes that are read, by the ending of the file: one file each, which refers to no other, and whose
-reader comes to an end on a file that is cut short (that of Nastran's does not)."""
+MESHES = {".msh": "gmsh", ".inp": "abaqus", ".bdf": "nastran", ".nas": "nastran", ".vtu": "vtu", ".vtk": "vtk"}
+"""Formats of meshes that are read, by the ending of the file: one file each, which refers to no other."""
+OTHER_SOLIDS = ("wedge", "pyramid")
+"""Beginnings of the names of solid elements that are not supported, and must not be left out."""
+SOLID_CARDS = ("CTETRA", "CHEXA", "CPENTA", "CPYRA")
+"""Nastran cards of solid elements."""
 UNPERMITTED = (
     "a gmsh script can run any command; if you trust it, permit it with --allow-scripts (modes, run, view) or "
     "EXUGEAR_ALLOW_SCRIPTS=1; a STEP file needs no permission"
@@ -178,16 +182,18 @@ def read_solid(path: Path, unit: float = 1.0) -> Any:
     if kind == "abaqus" and _includes(path):
         raise SolidError(f"{path}: refers to another file by *INCLUDE; write the whole mesh into one file")
     try:
-        content = getattr(meshio, kind).read(str(path))
+        content = _read_nastran(path, meshio) if kind == "nastran" else getattr(meshio, kind).read(str(path))
+    except SolidError:
+        raise
     except Exception as error:  # its readers let out whatever damaged content makes them stumble on
         content = _rewritten_by_gmsh(path, meshio)
         if content is None:
             raise SolidError(f"{path}: meshio cannot read it as {kind} ({error or type(error).__name__})") from None
     solid: dict[str, list[Any]] = {}
     for block in content.cells:
-        if block.type in CORNERS:
+        if block.type in CORNERS or block.type.startswith(OTHER_SOLIDS):
             solid.setdefault(block.type, []).append(block.data)
-    if len(solid) != 1:
+    if len(solid) != 1 or next(iter(solid)) not in CORNERS:
         found = ", ".join(solid or sorted({block.type for block in content.cells})) or "nothing"
         raise SolidError(
             f"{path}: contains {found}; a solid must have elements of one of the types {', '.join(CORNERS)}"
@@ -228,6 +234,45 @@ def _rewritten_by_gmsh(path: Path, meshio: Any) -> Any:
         gmsh.finalize()
         for number, handler in handlers.items():
             signal.signal(number, handler)
+
+
+def _read_nastran(path: Path, meshio: Any) -> Any:
+    """Read nodes and solid elements of a Nastran bulk data file, without all else that it holds.
+
+    meshio would not come to an end on a file that is cut short, and takes no notice of coordinate systems of nodes.
+    """
+    kept = []
+    wanted = False
+    with path.open(encoding="utf-8", errors="replace") as lines:
+        for number, line in enumerate(lines, start=1):
+            head = line[:8].partition(",")[0].strip().upper()
+            if head == "INCLUDE":
+                raise SolidError(f"{path}: line {number}: refers to another file by INCLUDE; write one file")
+            if head == "ENDDATA":
+                break
+            if line.startswith("$") or not line.strip():
+                continue
+            if head and head[0] not in "+*":
+                card = head.removesuffix("*").removesuffix("_")  # meshio marks elements of second order by _
+                wanted = card == "GRID" or card in SOLID_CARDS
+                if head.endswith("*") and card in SOLID_CARDS:
+                    raise SolidError(f"{path}: line {number}: {head} in fields of 16; write elements in fields of 8")
+                system = _coordinate_system(line) if card == "GRID" else ""
+                if system not in ("", "0"):
+                    raise SolidError(
+                        f"{path}: line {number}: the node is in the coordinate system {system[:16]}; write nodes in "
+                        "the basic system"
+                    )
+            if wanted:
+                kept.append(line.rstrip("\n"))
+    return meshio.nastran.read(io.StringIO("\n".join(["BEGIN BULK", *kept, "ENDDATA", ""])))
+
+
+def _coordinate_system(line: str) -> str:
+    """Field CP of a GRID card, as text."""
+    if "," in line:
+        return line.split(",")[2].strip() if line.count(",") > 1 else ""
+    return line[24:40].strip() if line[:8].rstrip().endswith("*") else line[16:24].strip()
 
 
 def _includes(path: Path) -> bool:

@@ -387,6 +387,8 @@ class Observer:
         overall = assembly.gearbox.case.overall
         self._input = assembly.spin[overall.input]
         self._overall = overall_row(assembly) / self.layout.radius
+        self._spins = [assembly.spin[name] for name in self.layout.names["body"]]
+        self._springs = assembly.springs
         rest = np.zeros(assembly.size)
         self._system = CompiledSystem(assembly, rest, rest, loads, step=1.0)
 
@@ -412,3 +414,8 @@ class Observer:
         """Fill those signals (samples, columns) that states q, v (samples, size) have by themselves."""
         signals[:, self.layout["input_speed"].start] = v[:, self._input]
         signals[:, self.layout["overall_dte_angle"].start] = q @ self._overall
+        signals[:, self.layout["body_speed"]] = v[:, self._spins]
+        if "coupling_torque" in self.layout:
+            first, second = self._springs.coordinates.T
+            torques = self._springs.stiffness * (q[:, second] - q[:, first])
+            signals[:, self.layout["coupling_torque"]] = torques + self._springs.damping * (v[:, second] - v[:, first])

@@ -468,7 +468,7 @@ def _add_elastic_body(parts: Parts, name: str, q: Floats, v: Floats) -> None:
             nodeNumbers=nodes,
             massMatrix=reduced.mass,
             stiffnessMatrix=reduced.stiffness,
-            dampingMatrix=assembly.gearbox.case.damping.body_time_s * reduced.stiffness,
+            dampingMatrix=assembly.damping_time(name) * reduced.stiffness,
             forceVector=assembly.constant_forces[coordinates],
             forceUserFunction=_gyroscopic_function(reduced) if reduced.gyroscopic.any() else 0,
         )

@@ -65,7 +65,7 @@ def assert_matrices_of_exudyn_are_those_of(assembly: Assembly, q: np.ndarray, to
     linear = linearise(assembly, q)
     others = [name for name in linear.stiffness if name not in assembly.mesh_names]
     stiff, damping = (sum(elements[name] for name in others) for elements in (linear.stiffness, linear.damping))
-    for one, two in zip(found, (linear.mass, stiff, damping), strict=True):
+    for one, two in zip(found, (linear.mass, stiff, damping + linear.modal), strict=True):
         assert np.abs(one - two).max() < tolerance * np.abs(two).max()
 
 

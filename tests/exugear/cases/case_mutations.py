@@ -209,7 +209,8 @@ def _with_matrices(folder: Path) -> dict[str, Any]:
     del case["bodies"]["box"]["solid"]
     case["bodies"]["box"]["external"] = {
         "file": "frame.op4", "nodes": "frame-nodes.pch", "units": "mm-t-s", "stiffness_name": "KAAX",
-        "mass_name": "MAAX", "constraint": "rbe3", "shift_mm": [0.0, 0.0, 0.0], "turn_deg": [0.0, 0.0, 0.0],
+        "mass_name": "MAAX", "constraint": "rbe3", "loss_factor": 0.02,
+        "shift_mm": [0.0, 0.0, 0.0], "turn_deg": [0.0, 0.0, 0.0],
         "seats": {"bearing_1": {"node": 1}, "foot": {"position_mm": [50.0, 0.0, -12.0]}},
     }  # fmt: skip
     return case

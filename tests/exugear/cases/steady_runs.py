@@ -10,8 +10,7 @@ from exugear.steady.balance.response import signals
 from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.system.loads import LoadTable
-from exugear.system.modes import overall_row
-from exugear.transient.compiled.solver import CompiledSystem
+from exugear.transient.compiled.solver import CompiledSystem, Observer
 
 
 def solver_of(assembly, speeds, level, harmonics=10, combinations=3):
@@ -96,8 +95,11 @@ def torque_of_errors(model, response):
     return -power / own.speed / float(rolling @ model.system.drive)
 
 
-def run_from(model, response, duration, step, torque, assembly=None):
-    """Instants, overall transmission error and angle of the input of a run in time that starts on a response."""
+def run_from(model, response, duration, step, torque, assembly=None, name="overall_dte_angle"):
+    """Instants, a signal of one part, and angle of the input of a run in time that starts on a response.
+
+    The overall transmission error is a length here.
+    """
     interface = response.interface
     system, motion = model.system, response.motion
     assembly = assembly or model.waves.assembly
@@ -107,25 +109,34 @@ def run_from(model, response, duration, step, torque, assembly=None):
     load = assembly.gearbox.case.static_load
     loads = LoadTable({**load.torques_N_m, load.locked[0]: torque}, varying=assembly.varying_loads)
     run = CompiledSystem(assembly, q, v, loads, step)
+    observer = Observer(assembly, loads)
+    kind, _, part = name.partition(" ")
+    column = observer.layout[kind].start
+    if part:
+        (dimension,) = next(own.dimensions[1:] for own in observer.layout.signals if own.name == kind)
+        column += observer.layout.names[dimension].index(part)
+    factor = 1.0 if part else observer.layout.radius
     steps, every = round(duration / step), 8
-    time, overall, angle = [], [], []
+    time, signal, angle = [], [], []
     for first in range(0, steps, 8000):
         states = np.empty((8000, assembly.size))
-        assert run.advance(first, states, np.empty_like(states)) == 8000
+        rates = np.empty_like(states)
+        assert run.advance(first, states, rates) == 8000
         time.append(step * (first + np.arange(every, 8001, every)))
-        overall.append(states[every - 1 :: every] @ overall_row(assembly))
-        angle.append(states[every - 1 :: every, system.pinned])
-    return tuple(np.concatenate(values) for values in (time, overall, angle))
+        states, rates = (np.ascontiguousarray(values[every - 1 :: every]) for values in (states, rates))
+        signal.append(factor * observer.observe(time[-1], states, rates)[0][:, column])
+        angle.append(states[:, system.pinned])
+    return tuple(np.concatenate(values) for values in (time, signal, angle))
 
 
-def fitted(solver, response, duration, step, last, assembly=None):
-    """Mean speed of a run in time that starts on a response, and lines of its overall transmission error.
+def fitted(solver, response, duration, step, last, assembly=None, name="overall_dte_angle"):
+    """Mean speed of a run in time that starts on a response, and lines of a signal, by default of the overall error.
 
     A line above half the rate at which the run is read appears as another one below it, which may be one of the
     others: those that hardly are there are left at zero.
     """
     model = solver.model
-    time, overall, angle = run_from(model, response, duration, step, drive_of(model, response), assembly)
+    time, overall, angle = run_from(model, response, duration, step, drive_of(model, response), assembly, name)
     late = time > duration - last
     speed, start = np.polyfit(time[late], angle[late], 1)
     half_rate = np.pi / (time[1] - time[0])

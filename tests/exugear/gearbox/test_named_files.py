@@ -180,9 +180,9 @@ def test_meshes_are_read_in_formats_that_refer_to_no_other_file(tmp_path: Path) 
         whole.write_text(f"** all of it\n{keyword}\n", encoding="utf-8")
         with pytest.raises(SolidError, match=r"whole\.inp: refers to another file by \*INCLUDE"):
             read_solid(whole)
-    for name in ("plate.xdmf", "plate.med", "plate.bdf", "plate", "plate.msh.h5"):
+    for name in ("plate.xdmf", "plate.med", "plate.fem", "plate", "plate.msh.h5"):
         (tmp_path / name).write_text("", encoding="utf-8")
-        with pytest.raises(SolidError, match=r"its name must end in \.msh, \.inp, \.vtu"):
+        with pytest.raises(SolidError, match=r"its name must end in \.msh, \.inp, \.bdf, \.nas, \.vtu"):
             read_solid(tmp_path / name)
 
 
@@ -199,13 +199,14 @@ def test_a_mesh_that_swells_while_it_is_read_is_refused(tmp_path: Path) -> None:
         read_solid(bomb)
 
 
-@pytest.mark.parametrize("suffix", [".msh", ".inp", ".vtu", ".vtk"])
+@pytest.mark.parametrize("suffix", [".msh", ".inp", ".bdf", ".vtu", ".vtk"])
 @needs_meshio
 def test_a_mesh_of_anything_is_refused_in_one_sentence(tmp_path: Path, suffix: str, capfd: Any) -> None:
     random = np.random.default_rng(3)
     head = {
         ".msh": b"$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 900000000000 1 1\n",
         ".vtk": b"# vtk DataFile Version 4.2\n\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS 9000000000000 double\n",
+        ".bdf": b"BEGIN BULK\nGRID,1,,0.,zero\nCTETRA,1,1,1,1,1,1\nGRID",
         ".inp": b"*NODE\n1, 0, zero\n*ELEMENT, TYPE=C3D4\n1, 2, 3\n",
     }.get(suffix, b"")
     for content in (b"", head, head + random.bytes(300), random.bytes(300)):

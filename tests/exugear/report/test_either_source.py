@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import json
 import re
 import shutil
 from pathlib import Path
@@ -23,7 +22,7 @@ from exugear.steady.steady_file import load_response, steady_path, stored_or_com
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 
 from ..cases.assembled import assembled, simulated, spur_with_tables
-from .page_view import IN_BROWSER, SIZES, View, opened
+from .page_view import IN_BROWSER, SIZES, View, data_of, opened
 
 pytestmark = pytest.mark.usefixtures("coarse_tables")
 
@@ -45,12 +44,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def response_path(folder: Path, variant: str) -> Path:
     return steady_path(folder, Choice(variant, LAW, "disc"), SETTINGS)
-
-
-def data_of(page: Path) -> dict[str, Any]:
-    found = re.search(r'id="data">(.*?)</script>', page.read_text(encoding="utf-8"), re.DOTALL)
-    assert found
-    return json.loads(found[1])
 
 
 @pytest.mark.validation

@@ -1,4 +1,4 @@
-"""Forces of a steady-state response on the housing: sign, phase, and the cards that Nastran reads."""
+"""Loads of a steady-state response on the housing: balance, sign, phase, and the cards that Nastran reads."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.units import RPM
 from exugear.project import Project
-from exugear.results.interface_loads import COLUMNS, interface_loads, loads_csv, nastran_loads, standing_supports
+from exugear.results.interface_loads import COLUMNS, interface_loads, loads_csv, nastran_loads
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import steady_response
 from exugear.system.build import assemble
@@ -61,7 +62,7 @@ def test_the_forces_are_those_of_the_mesh_less_the_inertia_of_the_shaft(spur: Ge
     mesh = signal("mesh_force spur")
     for axis, name in enumerate("xyz"):
         wanted = along_mesh[axis] * mesh - 1.0 * signal(f"seat_acceleration bearing_1 {name}")
-        assert np.abs(loads.force[:, 0, axis] - wanted).max() < 1e-5 * np.abs(mesh).max()
+        assert np.abs(loads.load[:, 0, axis] - wanted).max() < 1e-5 * np.abs(mesh).max()
 
 
 def test_forces_over_time_are_those_of_the_signals_with_the_other_sign(spur: Gearbox, response: xr.Dataset) -> None:
@@ -73,7 +74,7 @@ def test_forces_over_time_are_those_of_the_signals_with_the_other_sign(spur: Gea
     amplitude, phase = (signal[name].to_numpy().astype(float)[:, None] for name in ("amplitude", "phase"))
     wanted = -(amplitude * np.cos(order * angle + phase)).sum(axis=0)
     time = angle / loads.speed
-    found = (loads.force[:, 1, 1, None] * np.exp(2j * np.pi * loads.frequency[:, None] * time)).real.sum(axis=0)
+    found = (loads.load[:, 1, 1, None] * np.exp(2j * np.pi * loads.frequency[:, None] * time)).real.sum(axis=0)
     assert found == pytest.approx(wanted, rel=1e-6, abs=1e-6 * np.abs(wanted).max())
     assert np.ptp(found) > 1.0  # the mesh stiffness excites them
 
@@ -86,17 +87,17 @@ def test_orders_of_one_frequency_are_added_and_negative_ones_turned(spur: Gearbo
     three["phase"][:, 1:3] = 0.5
     (loads,) = interface_loads(spur, three, [0], NUMBERS)
     assert loads.order.tolist() == [20.0, 40.0]
-    assert loads.force[0, 0, 0] == pytest.approx(-(1.0 + np.exp(0.5j) + np.exp(-0.5j)), abs=1e-6)
+    assert loads.load[0, 0, 0] == pytest.approx(-(1.0 + np.exp(0.5j) + np.exp(-0.5j)), abs=1e-6)
 
 
 def test_a_response_of_another_gearbox_is_refused(spur: Gearbox, response: xr.Dataset) -> None:
     other = response.sel(signal=[name for name in response["signal"].to_numpy() if "bearing_2 z" not in name])
-    with pytest.raises(ValueError, match="no forces of the bearing bearing_2; compute the response of this gearbox"):
+    with pytest.raises(ValueError, match="no loads of the bearing bearing_2; compute the response of this gearbox"):
         list(interface_loads(spur, other, [0], NUMBERS))
 
 
 def test_bearings_between_moving_bodies_load_no_housing(grc: Gearbox) -> None:
-    names = {bearing.name for bearing in standing_supports(grc)}
+    names = {bearing.name for bearing in grc.standing_bearings}
     assert {"hss_a", "hss_bc", "plc_a"} <= names
     assert not any(name.startswith("pl_") for name in names)
 
@@ -105,11 +106,11 @@ def test_the_table_has_a_row_for_each_number(spur: Gearbox, response: xr.Dataset
     loads = list(interface_loads(spur, response, [0, 1, 2], NUMBERS))
     rows = list(csv.DictReader(io.StringIO(loads_csv(loads).decode())))
     assert tuple(rows[0]) == COLUMNS
-    assert len(rows) == 3 * len(loads[0].order) * 2 * 3
-    row = rows[-1]
-    assert (row["seat"], row["node"], row["direction"]) == ("bearing_2", "12", "z")
+    assert len(rows) == 3 * len(loads[0].order) * 2 * 6
+    row = rows[-4]
+    assert (row["seat"], row["node"], row["direction"], row["unit"]) == ("bearing_2", "12", "z", "N")
     assert float(row["frequency_Hz"]) == pytest.approx(float(row["order"]) * float(row["speed_rpm"]) / 60.0)
-    assert float(row["real_N"]) == pytest.approx(loads[-1].force[-1, 1, 2].real, rel=1e-8)
+    assert float(row["real"]) == pytest.approx(loads[-1].load[-1, 1, 2].real, rel=1e-8)
 
 
 def wide_cards(text: str) -> list[list[str]]:
@@ -157,12 +158,28 @@ def test_nastran_cards_hold_the_forces_over_frequency(spur: Gearbox, response: x
     assert set(combined[::2]) == {"1.0"}
     for load, (real, imaginary) in sources.items():
         node, direction = places[load]
-        wanted = loads.force[:, loads.nodes.index(node), direction - 1]
+        wanted = loads.load[:, loads.nodes.index(node), direction - 1]
         assert np.array_equal(tables[real][:, 0], frequency)
         assert tables[real][:, 1] == pytest.approx(wanted.real, rel=1e-9, abs=1e-12)
         assert tables[imaginary][:, 1] == pytest.approx(wanted.imag, rel=1e-9, abs=1e-12)
-    moving = {(node, axis) for s, node in enumerate(loads.nodes) for axis in range(3) if loads.force[:, s, axis].any()}
+    moving = {(node, axis) for s, node in enumerate(loads.nodes) for axis in range(6) if loads.load[:, s, axis].any()}
     assert {(node, direction - 1) for node, direction in places.values()} == moving
+
+
+def test_cards_convert_to_the_units_of_the_model(spur: Gearbox, response: xr.Dataset) -> None:
+    """A force of 1 N is 1e-3 kN = kg mm/ms2, a moment of 1 N m is 1 N m there and 1000 N mm in mm, t, s."""
+    (loads,) = interface_loads(spur, response, [1], NUMBERS)
+    loads = replace(loads, load=np.ones_like(loads.load))  # the spur pair has no moments
+    factors = {}
+    for units in ("SI", "mm-t-s", "mm-kg-ms"):
+        cards = wide_cards(nastran_loads(loads, units).decode())
+        factors[units] = {int(cells[2]): float(cells[3]) for name, *cells in cards if name == "DAREA"}
+        highest = max(float(cell) for name, *cells in cards if name == "FREQ" for cell in cells[1:] if cell)
+        assert highest == pytest.approx(loads.frequency[-1] * (1e-3 if units == "mm-kg-ms" else 1.0))
+    assert factors["SI"] == pytest.approx(dict.fromkeys(factors["SI"], 1.0))
+    assert set(factors["SI"]) == {1, 2, 3, 4, 5, 6}
+    assert factors["mm-t-s"] == pytest.approx({axis: 1.0 if axis < 4 else 1e3 for axis in factors["SI"]})
+    assert factors["mm-kg-ms"] == pytest.approx({axis: 1e-3 if axis < 4 else 1.0 for axis in factors["SI"]})
 
 
 def test_the_command_writes_table_and_cards_and_refuses_other_speeds(tmp_path: Path) -> None:

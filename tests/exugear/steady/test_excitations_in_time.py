@@ -12,11 +12,16 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.templates.kinds import template
 from exugear.steady.balance.response import signals
+from exugear.steady.findings import response_findings
 from exugear.steady.point_solver import PointSolver
+from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.steady.steady_file import to_dataset
+from exugear.steady.steady_response import response_of
 from exugear.system.build import assemble
 from exugear.system.modal_damping import with_damping_times
 from exugear.system.system import Assembly
 
+from ..cases import gear_trains
 from ..cases import table as table_case
 from ..cases.assembled import assembled
 from ..cases.bearing import BEARING_CASE, NON_LINEAR
@@ -98,6 +103,22 @@ def test_an_electric_drive_stays_on_its_steady_state(method, speed):
     assert every < 1e-3
 
 
+@pytest.mark.parametrize("name", ["coupling_torque shaft", "body_speed rotor", "body_speed output"])
+def test_torques_and_speeds_of_a_run_are_those_of_the_steady_response(name):
+    """Electric drive in the resonance of its order 48: signals of a run that starts on its steady state, RK4.
+
+    Method `nonlinear`: order 2 of the rotor, the ripple's order 24 less that of the mesh, is there as the torque turns
+    with the vibration of its body; with `parametric` it alone is 1.3e-3 of the speed of the rotor.
+    """
+    assembly = parallel(MACHINE)
+    solver = solver_of(assembly, (50.0, 150.0), "nonlinear", 8)
+    measured, lines = fitted(solver, solver.response(58.18), 0.6, 1.0 / 80e3, 0.3, assembly, name)
+    names = [signal.name for signal in solver.model.signal_names]
+    known = 2.0 * signals(solver.model, solver.response(measured))[1:, names.index(name)]
+    assert np.linalg.norm(known) > 0.0
+    assert np.linalg.norm(lines - known) < 1e-3 * np.linalg.norm(known)
+
+
 @pytest.mark.validation
 @pytest.mark.parametrize(("speed", "duration", "step"), [(8.0, 0.6, 1.0 / 60e3), (4.259, 1.2, 1.0 / 40e3)])
 def test_the_ripple_of_a_generator_stays_on_its_steady_state(grc, stiffness, speed, duration, step):
@@ -170,6 +191,49 @@ def test_teeth_that_part_under_a_ripple_stay_on_their_steady_state():
     assert own < 1e-3
     assert every < 2e-3
     assert amplitudes < 1e-3
+
+
+def planetary(variant: str) -> Assembly:
+    """Planetary stage with tables of sun and ring, and order 5 of the sun, 2 % of its torque; carrier locked."""
+    content = gear_trains.planetary("ring")
+    content["excitations"] = {"ripple": {"body": "sun", "orders": [5], "torque_N_m": [2.0]}}
+    gearbox = Gearbox.from_dict(content)
+    names = ("sun_planet", "planet_ring")
+    tables = {name: table_case.surface_of(gearbox, name, stiffness=3e8, variation=0.5) for name in names}
+    return assemble(gearbox, Choice(variant, "table"), tables)
+
+
+@pytest.mark.parametrize("variant", ["rigid", "bushing"])
+def test_a_torque_on_the_sun_of_a_planetary_stage_with_tables_stays_on_its_steady_state(variant):
+    """Method `nonlinear`, RK4 at 1/120 kHz."""
+    assembly = planetary(variant)
+    solver = solver_of(assembly, (50.0, 150.0), "nonlinear", 8)
+    own, every, amplitudes = differences(assembly, solver, 80.0, 5.0, 0.6, 1.0 / 120e3)
+    assert own < 1e-3
+    assert every < 2e-3
+    assert amplitudes < 1e-3
+
+
+@pytest.mark.parametrize(("variant", "told"), [("rigid", False), ("bushing", True)])
+def test_planets_at_their_mean_under_excitations_are_told_where_they_could_bear_unequally(variant, told):
+    settings = SteadySettings(SpeedRange(80.0, 90.0, 2), "nonlinear", at_resonances=False)
+    findings = response_findings(to_dataset(response_of(planetary(variant), settings)))
+    assert any("planets count at their mean under excitations" in own.text for own in findings) == told
+
+
+def test_speeds_at_which_loads_do_not_settle_are_told():
+    """A torque of 20 N m once per revolution turns the free pair too far at 5 rad/s, and does not at 100 rad/s."""
+    assembly, _ = pair({"orders": [1], "torque_N_m": [20.0]})
+    speeds = SpeedRange(5.0, 100.0, 2)
+    data = to_dataset(response_of(assembly, SteadySettings(speeds, "nonlinear", at_resonances=False)))
+    assert data["speed"].values.tolist() == [5.0, 100.0]
+    assert data["loads_at_mean_angles"].values.tolist() == [1, 0]
+    (told,) = [own.text for own in response_findings(data) if "mean speed" in own.text]
+    assert told.startswith("excitations at the angles of the mean speed, without the vibration, at 47.7 rpm: they turn")
+    assembly, _ = pair({"orders": [1], "torque_N_m": [0.1]})
+    data = to_dataset(response_of(assembly, SteadySettings(speeds, "nonlinear", at_resonances=False)))
+    assert not data["loads_at_mean_angles"].any()
+    assert not any("mean speed" in own.text for own in response_findings(data))
 
 
 def test_a_torque_moves_rolling_bearings_evaluated_in_time_as_in_a_run():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import tomllib
 from pathlib import Path
@@ -325,6 +326,51 @@ def test_leaving_out_what_is_not_there_is_bad_input(tmp_path, monkeypatch):
         assert result.exit_code == 2
         assert "--without rippel: no such excitation; choose one of: ripple" in " ".join(result.output.split())
     assert not (tmp_path / "results").exists()
+
+
+@pytest.mark.validation
+def test_the_page_lists_excitations_and_deviations_among_its_assumptions_with_their_warnings(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    case = content(orders=[12], torque_N_m=[500.0])
+    case["pairs"]["spur"]["stiffness"] = {"mean_N_per_m": 3e8, "cosine_N_per_m": [2e6]}
+    case["excitations"]["imbalance"] = {"body": "shaft_2", "z_mm": 30.0, "unbalance_g_mm": 300.0, "enabled": False}
+    case["deviations"] = {"one": {"body": "shaft_1", "gear": "pinion", "runout_um": 10.0}}
+    case["operation"] = {"speed_range_rpm": [300.0, 3000.0]}
+    (tmp_path / "gearbox.toml").write_text(toml_text(case), encoding="utf-8")
+    steady = ["steady", "gearbox.toml", "--speeds", "300:3000", "--points", "40", "--out", "results"]
+    assert CliRunner().invoke(app, steady).exit_code == 0
+    assert CliRunner().invoke(app, ["report", "results", "--stored"]).exit_code == 0
+    page = html.unescape((tmp_path / "results" / "report.html").read_text(encoding="utf-8"))
+    assumptions = page.partition('id="assumptions"')[2]
+    assert "Excitations beside the gears, at the static torque: ripple (order 12 of shaft 1)." in assumptions
+    assert "Excitations of the file that are left out: imbalance." in assumptions
+    assert "Deviations of gears, pitch over one revolution: pinion on shaft 1 (eccentricity 5 µm)." in assumptions
+    assert "excitations.ripple: amplitude of 500 N m on shaft 1" in page
+
+
+def test_a_continuation_under_an_excitation_is_refused_before_any_work(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "gearbox.toml").write_text(toml_text(content(orders=[12], torque_percent=[1.0])), encoding="utf-8")
+    arguments = ["steady", "gearbox.toml", "--speeds", "300:3000", "--method", "nonlinear", "--continuation"]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 2
+    said = " ".join(result.output.split())
+    assert "continuation: excitations.ripple is not followed through turning points; add --without ripple" in said
+    assert not (tmp_path / "results").exists()
+
+
+def test_the_summary_lists_speeds_at_which_loads_do_not_settle(tmp_path, monkeypatch):
+    """Order 1 with a fifth of the torque turns the free pair too far near standstill, and not above 300 rpm."""
+    monkeypatch.chdir(tmp_path)
+    case = content(orders=[1], torque_N_m=[20.0])
+    case["pairs"]["spur"]["stiffness"] = {"mean_N_per_m": 3e8, "cosine_N_per_m": [2e6]}
+    (tmp_path / "gearbox.toml").write_text(toml_text(case), encoding="utf-8")
+    arguments = ["steady", "gearbox.toml", "--method", "nonlinear", "--points", "5", "--json", "--out", "results"]
+    found = json.loads(CliRunner().invoke(app, [*arguments, "--speeds", "30:60"]).stdout)
+    assert found["excitations_at_mean_angles_rpm"]
+    assert max(found["excitations_at_mean_angles_rpm"]) < 61.0
+    found = json.loads(CliRunner().invoke(app, [*arguments, "--speeds", "2000:3000"]).stdout)
+    assert found["excitations_at_mean_angles_rpm"] == []
 
 
 def test_the_terminal_names_the_excitation_of_an_order(tmp_path, monkeypatch):

@@ -82,7 +82,7 @@ function draw(cuts) {
   const lowest = known.length ? Math.max(Math.min(...known), highest - DEPTH) : -1;
   /** @type {import("./plots.js").Bounds} */
   const bounds = { x: [0, allSpeeds(group)[1]], y: [lowest - 3, highest + 5] };
-  const unit = state.channel === "overall" ? "µm" : "N";
+  const unit = group.variants[group.main].channels.find((one) => one.name === state.channel)?.unit ?? "µm";
   const single = state.lines.length === 1;
   const tables = cuts.map((cut) => /** @type {PlotData} */ ([cut.speeds, cut.levels]));
   const joined = tables.length ? uPlot.join(tables) : /** @type {PlotData} */ ([[0, 1]]);

@@ -25,10 +25,12 @@ from exugear.system.bodies.matrix_files.plain import (
     read_npz,
 )
 from exugear.system.bodies.matrix_files.punch import punch_content, punch_nodes_content, read_punch
+from exugear.system.bodies.matrix_files.recovery import read_recovery, recovery_content, with_surface
 
 MatrixFormat = Literal["npz", "csv", "mtx", "op4", "dmig"]
-Kind = Literal["stiffness", "mass"]
+Kind = Literal["stiffness", "mass", "gyroscopic"]
 KINDS: tuple[Kind, ...] = ("stiffness", "mass")
+"""Matrices of every body."""
 PUNCH = (".pch", ".bdf", ".dat", ".nas", ".asm")
 """Endings of Nastran punch and bulk data files."""
 ENDINGS = (".npz", ".csv", ".mtx", ".op4", *PUNCH)
@@ -38,6 +40,7 @@ NODE_ENDINGS = (".csv", ".inp", ".npz", *PUNCH)
 NAMES: Mapping[Kind, tuple[str, ...]] = {
     "stiffness": ("KAAX", "KAA", "KXX", "KGG", "K2GG", "K", "STIFF"),
     "mass": ("MAAX", "MAA", "MXX", "MGG", "M2GG", "M", "MASS"),
+    "gyroscopic": ("GAAX", "GYRO", "BAAX", "BAA", "BGG", "B2GG", "G", "D"),
 }
 """Usual names of the matrices in Nastran files, the first ones preferred."""
 WRITTEN_NAMES = {"stiffness": "KAAX", "mass": "MAAX"}
@@ -55,7 +58,10 @@ INSTEAD = {
 
 @dataclass(frozen=True)
 class MatrixFiles:
-    """Files of a body: `file` with both matrices, or one for each; and the nodes, if these have no positions."""
+    """Files of a body: `file` with both matrices, or one for each; and the nodes, if these have no positions.
+
+    A gyroscopic matrix has a file of its own.
+    """
 
     file: Path | None = None
     stiffness: Path | None = None
@@ -63,11 +69,15 @@ class MatrixFiles:
     nodes: Path | None = None
     names: Mapping[Kind, str] | None = None
     """Names of the matrices in Nastran files; by default the first of `NAMES` that is there."""
+    gyroscopic: Path | None = None
+    recovery: Path | None = None
+    """Surface, see `exugear.system.bodies.matrix_files.recovery`."""
 
     @property
     def paths(self) -> tuple[Path, ...]:
         """All files."""
-        return tuple(path for path in (self.file, self.stiffness, self.mass, self.nodes) if path is not None)
+        given = (self.file, self.stiffness, self.mass, self.nodes, self.gyroscopic, self.recovery)
+        return tuple(path for path in given if path is not None)
 
 
 def read_matrices(files: MatrixFiles) -> InterfaceMatrices:
@@ -109,7 +119,16 @@ def read_matrices(files: MatrixFiles) -> InterfaceMatrices:
             f"whose name ends in {', '.join(NODE_ENDINGS)}"
         )
     path, table = tables[0]
-    return interface_matrices(matrices["stiffness"], matrices["mass"], table, path)
+    more: dict[str, LabelledMatrix] = {}
+    if files.gyroscopic is not None:
+        found, others, _ = _read(files.gyroscopic, frozenset(NAMES["gyroscopic"]))
+        more["gyroscopic"] = _chosen(files.gyroscopic, found, others, "gyroscopic", files)
+    if files.recovery is None:
+        return interface_matrices(matrices["stiffness"], matrices["mass"], table, path, more)
+    recovery = read_recovery(files.recovery)
+    more["normal_motion"] = recovery.normal_motion
+    combined = interface_matrices(matrices["stiffness"], matrices["mass"], table, path, more)
+    return with_surface(combined, recovery, files.recovery)
 
 
 def read_nodes(path: Path) -> NodeTable:
@@ -165,7 +184,7 @@ def _chosen(
     """Choose the stiffness or mass matrix of a file."""
     stated = None if files.names is None else files.names.get(kind)
     candidates = [stated.upper()] if stated is not None else [kind, *NAMES[kind]]
-    if files.file is None:
+    if files.file is None or kind == "gyroscopic":
         candidates.append("matrix")
     name = next((name for name in candidates if name in found), None)
     if name is None and "matrix" in found:
@@ -176,7 +195,8 @@ def _chosen(
         known = ", ".join(others[:20]) or "none"
         named = "" if stated is None else f" named {stated}"
         raise MatrixFileError(
-            f"{path}: no {kind} matrix{named}; matrices are {known}; set {kind}_name to the name of one"
+            f"{path}: no {kind} matrix{named}; matrices are {known}; "
+            + (f"name it {NAMES[kind][0]}" if kind == "gyroscopic" else f"set {kind}_name to the name of one")
         )
     return found[name]
 
@@ -189,22 +209,25 @@ def file_contents(matrices: InterfaceMatrices, stem: str, form: MatrixFormat) ->
     stem : beginning of the file names
     form : npz, csv, mtx (Abaqus matrix input) and op4 (ASCII) keep all digits; dmig (Nastran punch) ten to fourteen
     """
+    surface = {} if matrices.normal_motion is None else {f"{stem}-surface.npz": recovery_content(matrices)}
     if form == "npz":
-        return {f"{stem}.npz": npz_content(matrices)}
+        return {f"{stem}.npz": npz_content(matrices)} | surface
     if form == "dmig":
-        return {f"{stem}.pch": punch_content(matrices, WRITTEN_NAMES)}
+        return {f"{stem}.pch": punch_content(matrices, WRITTEN_NAMES)} | surface
     if form == "op4":
-        return {
+        return surface | {
             f"{stem}.op4": op4_content(matrices, WRITTEN_NAMES),
             f"{stem}-nodes.pch": punch_nodes_content(matrices),
         }
     content = csv_matrix_content if form == "csv" else mtx_content
     files = {f"{stem}-{kind}.{form}": content(matrices, kind) for kind in KINDS}
-    return {**files, f"{stem}-nodes.csv": csv_nodes_content(matrices)}
+    return {**files, f"{stem}-nodes.csv": csv_nodes_content(matrices)} | surface
 
 
-def keys_of(stem: str, form: MatrixFormat) -> dict[str, str]:
+def keys_of(stem: str, form: MatrixFormat, with_surface: bool = False) -> dict[str, str]:
     """Keys of `[bodies.NAME.external]` that name the files of `file_contents`."""
+    if with_surface:
+        return {**keys_of(stem, form), "recovery": f"{stem}-surface.npz"}
     if form in ("npz", "dmig"):
         return {"file": f"{stem}.{'pch' if form == 'dmig' else form}"}
     if form == "op4":

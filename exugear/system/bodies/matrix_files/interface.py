@@ -88,6 +88,12 @@ class InterfaceMatrices(ReprMixin, line=": {nodes!n} interface nodes, {modal!n} 
     mass: Floats
     stiffness: Floats
     """(n, n)"""
+    gyroscopic: Floats | None = None
+    """(n, n) antisymmetric G of M q'' + Omega G q' + K q = f, Omega in rad/s about +z, if it is known."""
+    normal_motion: Floats | None = None
+    """(n, n) integral of (n . u)(n . u)^T over the outer surface, if it is known."""
+    area: float = 0.0
+    """Of this surface."""
 
     @property
     def size(self) -> int:
@@ -142,6 +148,9 @@ class InterfaceMatrices(ReprMixin, line=": {nodes!n} interface nodes, {modal!n} 
             positions=self.positions * length,
             mass=self.mass * factors,
             stiffness=self.stiffness * factors / time**2,
+            gyroscopic=None if self.gyroscopic is None else self.gyroscopic * factors,
+            normal_motion=None if self.normal_motion is None else self.normal_motion * factors * length**2 / mass,
+            area=self.area * length**2,
         )
 
     def moved(self, rotation: Floats, shift: Sequence[float]) -> InterfaceMatrices:
@@ -160,6 +169,8 @@ class InterfaceMatrices(ReprMixin, line=": {nodes!n} interface nodes, {modal!n} 
             positions=self.positions @ rotation.T + np.asarray(shift),
             mass=turned @ self.mass @ turned.T,
             stiffness=turned @ self.stiffness @ turned.T,
+            gyroscopic=None if self.gyroscopic is None else turned @ self.gyroscopic @ turned.T,
+            normal_motion=None if self.normal_motion is None else turned @ self.normal_motion @ turned.T,
         )
 
     def in_order(self, nodes: Sequence[int]) -> InterfaceMatrices:
@@ -172,6 +183,8 @@ class InterfaceMatrices(ReprMixin, line=": {nodes!n} interface nodes, {modal!n} 
             positions=self.positions[list(nodes)],
             mass=self.mass[np.ix_(order, order)],
             stiffness=self.stiffness[np.ix_(order, order)],
+            gyroscopic=None if self.gyroscopic is None else self.gyroscopic[np.ix_(order, order)],
+            normal_motion=None if self.normal_motion is None else self.normal_motion[np.ix_(order, order)],
         )
 
     def rigid_motions(self, centre: Sequence[float] | Floats) -> Floats:
@@ -263,9 +276,13 @@ class EntryList:
 
 
 def interface_matrices(
-    stiffness: LabelledMatrix, mass: LabelledMatrix, nodes: NodeTable, path: object
+    stiffness: LabelledMatrix,
+    mass: LabelledMatrix,
+    nodes: NodeTable,
+    path: object,
+    others: Mapping[str, LabelledMatrix] | None = None,
 ) -> InterfaceMatrices:
-    """Combine a stiffness and a mass matrix with the positions of their nodes.
+    """Combine a stiffness and a mass matrix, and others by the names of their fields, with the positions of nodes.
 
     The nodes are in the order of their numbers. Local axes are removed. A coordinate that only one matrix has is zero
     in the other. A number without a position and with a single coordinate is a modal coordinate.
@@ -280,7 +297,8 @@ def interface_matrices(
         A node has no position, or the order of coordinates is not known or has another length than the matrices.
     """
     labels_of = {}
-    for name, matrix in (("stiffness", stiffness), ("mass", mass)):
+    given = {"stiffness": stiffness, "mass": mass, **(others or {})}
+    for name, matrix in given.items():
         labels = nodes.order if matrix.labels is None else matrix.labels
         if len(labels) != len(matrix.values):
             raise MatrixFileError(
@@ -288,7 +306,11 @@ def interface_matrices(
                 f"{len(matrix.values)}; list exactly the interface nodes, six coordinates each, and the modal "
                 "coordinates as scalar points"
             )
-        labels_of[name] = labels
+        # Abaqus gives a modal coordinate the component 1, other programs none.
+        labels_of[name] = tuple(
+            (number, 0 if component == 1 and number not in nodes.positions else component)
+            for number, component in labels
+        )
     found: dict[int, set[int]] = {}
     for labels in labels_of.values():
         for number, component in labels:
@@ -315,7 +337,7 @@ def interface_matrices(
     size = NODE_SIZE * len(numbers) + len(modal)
     check_size(size, path, "of all coordinates")
     whole = {}
-    for name, matrix in (("stiffness", stiffness), ("mass", mass)):
+    for name, matrix in given.items():
         at = np.array([place[label] for label in labels_of[name]])
         if len(np.unique(at)) < len(at):
             raise MatrixFileError(f"{path}: two rows of the {name} matrix have the same node and component")
@@ -326,10 +348,13 @@ def interface_matrices(
         if number in nodes.axes:
             for start in (6 * n, 6 * n + 3):
                 to_global[start : start + 3, start : start + 3] = nodes.axes[number]
+    turned = {name: to_global.T @ matrix @ to_global for name, matrix in whole.items()}
     return InterfaceMatrices(
         nodes=tuple(numbers),
         positions=np.array([nodes.positions[number] for number in numbers]),
         modal=tuple(modal),
-        mass=to_global.T @ whole["mass"] @ to_global,
-        stiffness=to_global.T @ whole["stiffness"] @ to_global,
+        mass=turned["mass"],
+        stiffness=turned["stiffness"],
+        gyroscopic=turned.get("gyroscopic"),
+        normal_motion=turned.get("normal_motion"),
     )

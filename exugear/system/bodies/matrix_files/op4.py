@@ -65,7 +65,7 @@ class _Matrix:
         if self.kind not in (_SINGLE, _DOUBLE):
             raise MatrixFileError(
                 f"{self.path}: matrix {self.name} is complex; write real matrices, and state structural damping by "
-                "damping.body_time_s"
+                "loss_factor"
             )
         if self.columns != self.rows:
             raise MatrixFileError(

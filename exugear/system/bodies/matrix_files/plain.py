@@ -37,6 +37,8 @@ from fe_ste.tools.files import FileError, open_regular
 
 ARRAYS = ("nodes", "positions", "mass", "stiffness")
 """Arrays that an NPZ file must have."""
+MOST_NUMBERS = 60_000_000
+"""Largest number of numbers of an array that is no matrix, 480 MB."""
 _DEFLATE_RATIO = 1040
 """Deflate shortens nothing by more than a factor of 1032."""
 _MODAL_NUMBER = 900_001
@@ -53,20 +55,7 @@ def read_npz(path: Path) -> tuple[dict[str, LabelledMatrix], NodeTable]:
     MatrixFileError
         The file is no NPZ file, is truncated, lacks an array, or an array has another type, shape or size than stated.
     """
-    try:
-        with open_regular(path) as file:
-            length = os.fstat(file.fileno()).st_size
-            with zipfile.ZipFile(file) as archive:
-                arrays = {name: _array(archive, name, length, path) for name in ARRAYS}
-                named = "modal.npy" in archive.namelist()
-                arrays["modal"] = _array(archive, "modal", length, path) if named else np.zeros(0)
-    except FileError as error:
-        raise MatrixFileError(str(error)) from None
-    # zipfile and zlib raise many kinds of errors on damaged files, also NotImplementedError and EOFError.
-    except (zipfile.BadZipFile, OSError, ValueError, EOFError, RuntimeError, LookupError, MemoryError) as error:
-        if isinstance(error, MatrixFileError):
-            raise
-        raise MatrixFileError(f"{path}: not a readable NPZ file ({error}); write it again with numpy.savez") from None
+    arrays = read_arrays(path, ARRAYS, ("modal",))
     nodes, positions = arrays["nodes"], arrays["positions"]
     if nodes.dtype.kind not in "iu" or nodes.ndim != 1 or positions.shape != (len(nodes), 3):
         raise MatrixFileError(
@@ -83,8 +72,8 @@ def read_npz(path: Path) -> tuple[dict[str, LabelledMatrix], NodeTable]:
             f"{path}: array stiffness has {size} rows for {len(numbers)} nodes; expected six coordinates per node, "
             "then modal coordinates"
         )
-    modal = [int(number) for number in arrays["modal"]] or range(_MODAL_NUMBER, _MODAL_NUMBER + modes)
-    labels = (*_six_each(numbers), *((number, 0) for number in modal))
+    modal = [int(number) for number in arrays.get("modal", np.zeros(0))] or range(_MODAL_NUMBER, _MODAL_NUMBER + modes)
+    labels = (*six_each(numbers), *((number, 0) for number in modal))
     if len(set(labels)) < len(labels) or len(labels) != size or set(modal) & set(numbers):
         raise MatrixFileError(
             f"{path}: arrays nodes and modal state {len(labels)} coordinates for {size} rows, or a number twice; give "
@@ -95,15 +84,47 @@ def read_npz(path: Path) -> tuple[dict[str, LabelledMatrix], NodeTable]:
     return matrices, table
 
 
-def _array(archive: zipfile.ZipFile, name: str, length: int, path: Path) -> NDArray[Any]:
+def read_arrays(
+    path: Path, names: tuple[str, ...], others: tuple[str, ...], most: int | None = None
+) -> dict[str, NDArray[Any]]:
+    """Arrays of real numbers of an NPZ file: `names`, and those of `others` that it has; nothing in it is run.
+
+    Parameters
+    ----------
+    most : rows that an array may have; by default as many as a matrix
+
+    Raises
+    ------
+    MatrixFileError
+        The file is no NPZ file, is truncated, lacks an array, or an array has another type or size than stated.
+    """
+    try:
+        with open_regular(path) as file:
+            length = os.fstat(file.fileno()).st_size
+            with zipfile.ZipFile(file) as archive:
+                known = set(archive.namelist())
+                chosen = (*names, *(name for name in others if f"{name}.npy" in known))
+                return {name: _array(archive, name, length, path, names, most) for name in chosen}
+    except FileError as error:
+        raise MatrixFileError(str(error)) from None
+    # zipfile and zlib raise many kinds of errors on damaged files, also NotImplementedError and EOFError.
+    except (zipfile.BadZipFile, OSError, ValueError, EOFError, RuntimeError, LookupError, MemoryError) as error:
+        if isinstance(error, MatrixFileError):
+            raise
+        raise MatrixFileError(f"{path}: not a readable NPZ file ({error}); write it again with numpy.savez") from None
+
+
+def _array(
+    archive: zipfile.ZipFile, name: str, length: int, path: Path, expected: tuple[str, ...], most: int | None
+) -> NDArray[Any]:
     """Array of an NPZ file, allocated after its header was compared with the size of the file."""
     members = archive.infolist()
     if len(members) > _MOST_MEMBERS:
-        raise MatrixFileError(f"{path}: {len(members)} arrays; expected {', '.join(ARRAYS)}")
+        raise MatrixFileError(f"{path}: {len(members)} arrays; expected {', '.join(expected)}")
     info = next((member for member in members if member.filename == f"{name}.npy"), None)
     if info is None:
         found = ", ".join(member.filename.removesuffix(".npy")[:40] for member in members[:8]) or "none"
-        raise MatrixFileError(f"{path}: no array {name!r}; arrays are {found}; write {', '.join(ARRAYS)}")
+        raise MatrixFileError(f"{path}: no array {name!r}; arrays are {found}; write {', '.join(expected)}")
     if info.file_size > _DEFLATE_RATIO * length:
         raise MatrixFileError(
             f"{path}: array {name} states {info.file_size} bytes in a file of {length}; write it again"
@@ -114,10 +135,15 @@ def _array(archive: zipfile.ZipFile, name: str, length: int, path: Path) -> NDAr
         shape, fortran_order, dtype = read_header(member)
         if dtype.kind not in "fiu" or len(shape) > 2:
             raise MatrixFileError(f"{path}: array {name} has type {dtype} and shape {shape}; expected real numbers")
-        if shape != (0,):  # a body without modal coordinates
+        count = int(np.prod(shape, dtype=object))
+        if most is not None and (max(shape, default=1) > most or count > MOST_NUMBERS):
+            raise MatrixFileError(
+                f"{path}: array {name} has the shape {shape}; at most {most} rows and {MOST_NUMBERS} numbers are read"
+            )
+        if most is None and shape != (0,):  # a body without modal coordinates
             check_size(max(shape, default=0), path, name)
         begin = member.tell()
-        needed = int(np.prod(shape, dtype=object)) * dtype.itemsize
+        needed = count * dtype.itemsize
         if needed != info.file_size - begin:
             raise MatrixFileError(
                 f"{path}: array {name} {shape} needs {needed} bytes, the file has {info.file_size - begin}; write it "
@@ -142,7 +168,8 @@ def _square(values: NDArray[Any], name: str, path: object) -> NDArray[np.float64
     return matrix
 
 
-def _six_each(numbers: list[int]) -> list[Label]:
+def six_each(numbers: list[int]) -> list[Label]:
+    """Return the coordinates of nodes."""
     return [(number, component) for number in numbers for component in range(1, NODE_SIZE + 1)]
 
 
@@ -238,7 +265,7 @@ def read_csv_nodes(path: Path) -> NodeTable:
         if any(word.strip() for word in words):
             x, y, z = (real(word, place) for word in words)
             positions[node] = (x, y, z)
-            order += _six_each([node])
+            order += six_each([node])
         else:
             order.append((node, 0))
     return NodeTable(positions, order=tuple(order))

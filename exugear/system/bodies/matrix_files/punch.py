@@ -136,7 +136,7 @@ class _Matrices:
             if form not in (SQUARE, SYMMETRIC) or kind not in REAL_TYPES:
                 raise MatrixFileError(
                     f"{card.place}: DMIG {name} has form {form} and type {kind}; only real symmetric (6) and square "
-                    "(1) matrices are read; write those, and state structural damping by damping.body_time_s"
+                    "(1) matrices are read; write those, and state structural damping by loss_factor"
                 )
             self.forms[name] = (form, kind)
             return

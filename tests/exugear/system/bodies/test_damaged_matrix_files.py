@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 
 from exugear.system.bodies.matrix_files.files import MatrixFiles, MatrixFormat, file_contents, keys_of, read_matrices
-from exugear.system.bodies.matrix_files.interface import MatrixFileError
+from exugear.system.bodies.matrix_files.interface import InterfaceMatrices, MatrixFileError
 from exugear.system.bodies.matrix_files.op4 import read_op4
+from exugear.system.bodies.matrix_files.plain import npz_content
 
 from ...cases.beams import sorted_frame
 from .test_matrix_files import BOTH, binary_op4
@@ -175,3 +176,83 @@ def test_a_line_without_end_is_refused(tmp_path: Path) -> None:
     file.write_bytes(b"GRID" + b" " * 1_100_000)
     with pytest.raises(MatrixFileError, match="line 1 has more than 1000000 bytes"):
         read_matrices(MatrixFiles(file))
+
+
+def surfaces(body: InterfaceMatrices) -> dict[str, bytes]:
+    """Files of a surface in both forms."""
+    points = np.vstack([body.positions + 0.1 * direction for direction in np.eye(3)])
+    normals = np.repeat(np.eye(3), len(body.nodes), axis=0)
+    displacement = np.zeros((len(points), 3, body.size))
+    for n, (node, at) in enumerate((node, at) for at in range(3) for node in range(len(body.nodes))):
+        displacement[n, :, 6 * node : 6 * node + 3] = np.eye(3)
+        x, y, z = 0.1 * np.eye(3)[at]
+        displacement[n, :, 6 * node + 3 : 6 * node + 6] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
+    arrays = {"nodes": np.array(body.nodes), "modal": np.array(body.modal)}
+    of_points = {
+        "points": points, "normals": normals, "areas": np.full(len(points), 0.01),
+        "displacement": displacement.reshape(-1, body.size),
+    }  # fmt: skip
+    rows = np.einsum("pa,pan->pn", normals, displacement)
+    of_integral = {"normal_motion": 0.01 * rows.T @ rows, "area": np.array([0.01 * len(points)])}
+    found = {}
+    for name, more in (("points", of_points), ("integral", of_integral)):
+        buffer = io.BytesIO()
+        np.savez(buffer, **arrays, **more)
+        found[name] = buffer.getvalue()
+    return found
+
+
+@pytest.mark.parametrize("damages", DAMAGES)
+@pytest.mark.parametrize("form", ["points", "integral"])
+def test_a_damaged_surface_is_read_or_is_one_error(tmp_path: Path, form: str, damages: int) -> None:
+    chance = random.Random(form)
+    body = sorted_frame()
+    content = surfaces(body)[form]
+    (tmp_path / "body.npz").write_bytes(npz_content(body))
+    files = MatrixFiles(file=tmp_path / "body.npz", recovery=tmp_path / "surface.npz")
+    (tmp_path / "surface.npz").write_bytes(content)
+    assert read_in_little_memory(files)
+    refused = 0
+    for _ in range(damages):
+        (tmp_path / "surface.npz").write_bytes(damaged(content, chance))
+        refused += not read_in_little_memory(files)
+    assert refused > damages // 4
+
+
+@pytest.mark.parametrize("shape", [(600_000, 26), (60_000_000, 26), (3, 10**15), (600_000, 2**62)])
+def test_a_surface_that_states_more_than_it_has_allocates_nothing(tmp_path: Path, shape: tuple[int, int]) -> None:
+    body = sorted_frame()
+    (tmp_path / "body.npz").write_bytes(npz_content(body))
+    with zipfile.ZipFile(tmp_path / "surface.npz", "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, value in (("nodes", np.array(body.nodes)), ("modal", np.array(body.modal))):
+            buffer = io.BytesIO()
+            np.save(buffer, value)
+            archive.writestr(f"{name}.npy", buffer.getvalue())
+        buffer = io.BytesIO()
+        np.lib.format.write_array_header_1_0(buffer, {"descr": "<f8", "fortran_order": False, "shape": shape})
+        archive.writestr("displacement.npy", buffer.getvalue() + bytes(1000))
+    assert not read_in_little_memory(MatrixFiles(file=tmp_path / "body.npz", recovery=tmp_path / "surface.npz"))
+
+
+@pytest.mark.parametrize("damages", DAMAGES)
+@pytest.mark.parametrize("suffix", [".csv", ".pch", ".op4", ".mtx"])
+def test_a_damaged_gyroscopic_matrix_is_read_or_is_one_error(tmp_path: Path, suffix: str, damages: int) -> None:
+    chance = random.Random(suffix)
+    body = sorted_frame()
+    form = {".csv": "csv", ".pch": "dmig", ".op4": "op4", ".mtx": "mtx"}[suffix]
+    written = file_contents(body, "body", form)
+    content = next(text for name, text in written.items() if name.endswith(suffix) and "stiffness" not in name)
+    content = content.replace(b"MAAX", b"GAAX")
+    (tmp_path / "body.npz").write_bytes(npz_content(body))
+    file = tmp_path / f"gyroscopic{suffix}"
+    order = {"nodes": tmp_path / "body-nodes.pch"} if suffix == ".op4" else {}
+    if order:
+        order["nodes"].write_bytes(written["body-nodes.pch"])
+    files = MatrixFiles(file=tmp_path / "body.npz", gyroscopic=file, **order)
+    file.write_bytes(content)
+    assert read_in_little_memory(files)
+    refused = 0
+    for _ in range(damages):
+        file.write_bytes(damaged(content, chance))
+        refused += not read_in_little_memory(files)
+    assert refused > damages // 8

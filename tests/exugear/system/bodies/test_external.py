@@ -5,11 +5,13 @@ from __future__ import annotations
 import copy
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
 import pytest
+import scipy.linalg
 from typer.testing import CliRunner
 
 from exugear.cli.app import app
@@ -17,23 +19,27 @@ from exugear.cli.tasks.export import write_together
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
+from exugear.gearbox.variant import Variant
 from exugear.report.pictures.scene import elastic_scene
+from exugear.results.sound.radiated_power import radiated_power, radiating_names
 from exugear.steady.mean_system.mean_system import unsuitable
 from exugear.system.bodies.external import interface_of
 from exugear.system.bodies.external_of_gearbox import check_external, external_warnings
-from exugear.system.bodies.matrix_files.files import MatrixFormat, file_contents, keys_of
+from exugear.system.bodies.matrix_files.files import MatrixFiles, MatrixFormat, file_contents, keys_of, read_matrices
 from exugear.system.bodies.matrix_files.interface import InterfaceMatrices
+from exugear.system.bodies.matrix_files.plain import csv_matrix_content
+from exugear.system.bodies.matrix_files.recovery import read_recovery
 from exugear.system.bodies.of_gearbox import node_numbers
 from exugear.system.bodies.reduction import ReducedBody, selective_mass_scaling
 from exugear.system.loads import LoadTable
 from exugear.system.modes import modes_of
-from exugear.system.statics import accelerating_start, static_state
+from exugear.system.statics import accelerating_start, linearise, static_state
 from exugear.system.system import Assembly, input_hash
 from exugear.transient.compiled.solver import CompiledSystem
 
 from ....optional_libraries import needs_gmsh, needs_meshio
 from ...cases.assembled import assembled, bodies_of
-from ...cases.beams import beams_between
+from ...cases.beams import STEEL, beam_matrices, beams_between
 from ...cases.both_ways import assert_matrices_of_exudyn_are_those_of, compiled_states, exudyn_states, relative_error
 from ...cases.box import box_content
 from ...cases.case_mutations import shaped_shafts
@@ -197,8 +203,186 @@ def test_the_housing_of_the_grc_written_and_read_back_is_the_same_in_the_gearbox
         "units": "SI",
         "seats": {**sectors, **shared, **{name: {"node": number} for name, number in numbers.items()}},
     }
+    content["bodies"]["housing"]["external"]["recovery"] = "box-surface.npz"
     found = assembled(Gearbox.from_dict(content, str(tmp_path / "case.toml")), Choice("flexible"), stiffness)
     assert largest_change(found, wanted) < TOLERANCE.get(form, 1e-9)
+    assert_sound_is_that_of(found, wanted)
+
+
+# Sound
+
+
+def assert_sound_is_that_of(found: Assembly, wanted: Assembly) -> None:
+    """Area and normal velocity of the outer surface within 1e-6, in motions with all coordinates."""
+    motion = np.random.default_rng(5).normal(size=(8, 2, wanted.size)) @ np.diag(1e-6 * np.ones(wanted.size))
+    frequencies = 2.0 * np.pi * np.linspace(50.0, 2000.0, 8)
+    (one, area), (two, wanted_area) = (
+        (own.surface_velocity(motion[:, 0] + 1j * motion[:, 1], frequencies), own.area)
+        for own in map(radiated_power, (found, wanted))
+        if own is not None
+    )
+    assert area == pytest.approx(wanted_area, rel=1e-6)
+    assert one == pytest.approx(two, rel=1e-6)
+
+
+@pytest.mark.parametrize("form", ["npz", "dmig", "csv"])
+def test_a_box_with_its_surface_radiates_as_it_does_when_reduced_here(
+    tmp_path: Path, housed: Assembly, box: InterfaceMatrices, form: MatrixFormat
+) -> None:
+    moved = box.moved(np.diag([-1.0, -1.0, 1.0]), (0.1, 0.0, 0.0)).from_si("mm-t-s")
+    keys = write(tmp_path, moved, form)
+    gearbox = box_of(tmp_path, {**keys, "units": "mm-t-s", "recovery": "box-surface.npz", "band_Hz": 6000.0,
+                                "turn_deg": [0.0, 0.0, 180.0], "shift_mm": [100.0, 0.0, 0.0]})  # fmt: skip
+    check_external(gearbox, "box")
+    assert radiating_names(gearbox, Variant.flexible) == ("box",)
+    found = assembled(gearbox, Choice("flexible"), STIFFNESS)
+    assert_sound_is_that_of(found, housed)
+    sound = radiated_power(found)
+    assert sound is not None
+    assert sound.limit == pytest.approx(4000.0)
+    without = box_of(tmp_path, {**keys, "units": "mm-t-s", "turn_deg": [0.0, 0.0, 180.0], "shift_mm": [100.0, 0, 0]})
+    assert radiating_names(without, Variant.flexible) == ()
+    assert radiated_power(assembled(without, Choice("flexible"), STIFFNESS)) is None
+
+
+def sphere(body: InterfaceMatrices, radius: float = 0.05) -> dict[str, np.ndarray]:
+    """Arrays of a sphere around the first node, whose 400 points move with it and with a mode by its normal."""
+    cosine = -1.0 + (2.0 * np.arange(400) + 1.0) / 400
+    angle = np.pi * (1.0 + 5.0**0.5) * np.arange(400)
+    sine = np.sqrt(1.0 - cosine**2)
+    normals = np.column_stack([sine * np.cos(angle), sine * np.sin(angle), cosine])
+    displacement = np.zeros((400, 3, body.size))
+    displacement[:, :, :3] = np.eye(3)
+    for n, (x, y, z) in enumerate(radius * normals):
+        displacement[n, :, 3:6] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
+    displacement[:, :, -1] = normals
+    return {
+        "nodes": np.array(body.nodes), "modal": np.array(body.modal), "normals": normals,
+        "points": body.positions[0] + radius * normals, "areas": np.full(400, np.pi * radius**2 / 100.0),
+        "displacement": displacement.reshape(1200, -1),
+    }  # fmt: skip
+
+
+def test_a_sphere_from_points_has_the_power_of_a_piston_and_of_breathing(
+    tmp_path: Path, box: InterfaceMatrices
+) -> None:
+    """Mean square of the normal along an axis 1/3, of breathing 1, and none of turning."""
+    arrays = sphere(box)
+    np.savez(tmp_path / "sphere.npz", **arrays)
+    found = read_recovery(tmp_path / "sphere.npz")
+    assert found.area == pytest.approx(4.0 * np.pi * 0.05**2)
+    motion = found.normal_motion.values / found.area
+    assert motion[:3, :3] == pytest.approx(np.eye(3) / 3.0, abs=2e-3)
+    assert np.trace(motion[:3, :3]) == pytest.approx(1.0, rel=1e-12)
+    assert motion[-1, -1] == pytest.approx(1.0, rel=1e-12)
+    assert np.abs(motion[3:6, 3:6]).max() < 1e-15
+    gearbox = box_of(tmp_path, {**write(tmp_path, box), "recovery": "sphere.npz"})
+    check_external(gearbox, "box")
+    assert radiated_power(assembled(gearbox, Choice("flexible"), STIFFNESS)) is not None
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"normals": lambda a: 2.0 * a}, r"point 1 has a normal of length 2 and the area .*; expected unit normals"),
+        ({"areas": lambda a: -a}, "expected unit normals and positive areas"),
+        ({"areas": lambda a: a[:-1]}, r"array points has the shape \(400, 3\); expected \(399, 3\) for 399 areas"),
+        ({"displacement": lambda a: a[:, :-1]}, r"array displacement has the shape .* expected \(1200, 26\)"),
+        (
+            {"displacement": lambda a: 1e3 * a},
+            r"not move with the nodes as a rigid body [(]translations by 1e[+]06",
+        ),
+        ({"displacement": lambda a: a[:, ::-1]}, "check order of coordinates, units"),
+        ({"points": lambda a: 1e3 * a}, r"[(]translations by 1 of its area[)]; check order of coordinates"),
+        ({"points": None}, "no array 'points'; write points, normals, areas, displacement, and nodes"),
+        ({"nodes": None}, "no array 'nodes'"),
+        ({"nodes": lambda a: a[[0, 0, 2]]}, "arrays nodes and modal have a number twice"),
+        ({"displacement": lambda a: a * np.nan}, "array displacement has values that are not finite"),
+    ],
+)
+def test_a_surface_that_does_not_fit_is_one_error(
+    tmp_path: Path, box: InterfaceMatrices, change: Mapping[str, Any], message: str
+) -> None:
+    arrays = sphere(box)
+    for name, function in change.items():
+        value = arrays.pop(name)
+        if function is not None:
+            arrays[name] = function(value)
+    np.savez(tmp_path / "sphere.npz", **arrays)
+    gearbox = box_of(tmp_path, {**write(tmp_path, box), "recovery": "sphere.npz"})
+    with pytest.raises(GearboxFileError, match=message) as refused:
+        check_external(gearbox, "box")
+    assert len(refused.value.errors) == 1
+
+
+# Damping
+
+
+def damped_box(folder: Path, box: InterfaceMatrices, external: Mapping[str, Any], **more: Any) -> Assembly:
+    """The spur pair in the box on supports that are 10,000 times softer and have no damping."""
+    content = dict(box_of(folder, {**write(folder, box), **external}).content)
+    content = copy.deepcopy(content)
+    for part in (*content["bearings"].values(), *content["mounts"].values()):
+        part["stiffness"] = {key: 1e-4 * value for key, value in part["stiffness"].items()}
+    content["static_load"]["torques_N_m"] = {key: 1e-4 * value for key, value in LOAD.items() if key == "shaft_1"}
+    content["damping"] = {"bearing_time_s": 0.0, "mesh_time_s": 0.0, **more}
+    gearbox = Gearbox.from_dict(content, str(folder / "case.toml"))
+    return assembled(gearbox, Choice("flexible"), {"spur": 1e-4 * STIFFNESS["spur"]})
+
+
+def free_modes(body: ReducedBody) -> tuple[np.ndarray, np.ndarray]:
+    """Angular frequencies (rad/s) and shapes of unit modal mass of the elastic modes of a free body."""
+    squares, shapes = scipy.linalg.eigh(body.stiffness, body.mass)
+    return np.sqrt(squares[6:]), shapes[:, 6:]
+
+
+@pytest.mark.parametrize(
+    ("external", "ratio"),
+    [
+        ({"loss_factor": 0.04}, lambda w: 0.02),
+        ({"damping_time_s": 2e-6}, lambda w: 1e-6 * w),
+        ({}, lambda w: 2.5e-6 * w),
+    ],
+)
+def test_a_nearly_free_box_has_the_damping_ratios_that_its_keys_state(
+    tmp_path: Path, box: InterfaceMatrices, external: dict[str, float], ratio: Any
+) -> None:
+    """Eta / 2 for structural damping, beta w / 2 for C = beta K; supports have 0.2 % of the strain energy."""
+    assembly = damped_box(tmp_path, box, external, body_time_s=5e-6)
+    wanted = free_modes(assembly.elastic_bodies["box"].reduced)[0]
+    modes = modes_of(assembly)
+    for w in wanted[:2]:
+        own = int(np.abs(modes.frequency - w / (2.0 * np.pi)).argmin())
+        assert modes.frequency[own] == pytest.approx(w / (2.0 * np.pi), rel=2e-3)
+        assert modes.damping_ratio[own] == pytest.approx(ratio(w), rel=1e-2)
+
+
+def test_rigid_motions_of_a_box_with_a_loss_factor_are_undamped(tmp_path: Path, box: InterfaceMatrices) -> None:
+    """The same matrix in the equations, their linearisation, and both solvers; C = eta w in each free mode."""
+    assembly = damped_box(tmp_path, box, {"loss_factor": 0.04})
+    body, at = assembly.elastic_bodies["box"].reduced, assembly.elastic_slices["box"]
+    q = np.zeros(assembly.size)
+    total = linearise(assembly, q).total_damping[at, at]
+    frequencies, shapes = free_modes(body)
+    assert shapes.T @ total @ shapes == pytest.approx(np.diag(0.04 * frequencies), abs=1e-9 * frequencies.max())
+    rigid = body.rigid_motions((0.0, 0.0, 0.0))
+    assert np.abs(total @ rigid).max() < 1e-9 * np.abs(total).max()
+    rate = np.random.default_rng(2).normal(size=assembly.size)
+    rate[[n for n in range(assembly.size) if n not in range(at.start, at.stop)]] = 0.0
+    change = assembly.forces(q, 1e-3 * rate) - assembly.forces(q, np.zeros(assembly.size))
+    assert change[at] == pytest.approx(-1e-3 * total @ rate[at], rel=1e-9, abs=1e-9 * np.abs(change).max())
+    assert_matrices_of_exudyn_are_those_of(assembly, q, 1e-9)
+
+
+def test_modal_damping_counts_a_loss_factor_towards_its_ratio(tmp_path: Path, box: InterfaceMatrices) -> None:
+    """0.2 % of critical in every mode, or more where the strain energy is mostly in the box, which alone has 4 %."""
+    content = copy.deepcopy(dict(box_of(tmp_path, {**write(tmp_path, box), "loss_factor": 0.08}).content))
+    content["damping"] = {"modal_percent": 0.2}
+    gearbox = Gearbox.from_dict(content, str(tmp_path / "case.toml"))
+    modes = modes_of(assembled(gearbox, Choice("flexible"), STIFFNESS))
+    moving = (modes.frequency > 1.0) & (modes.frequency < gearbox.case.elasticity.band_Hz)
+    assert modes.damping_ratio[moving].min() == pytest.approx(0.002, rel=1e-3)
+    assert 0.004 < modes.damping_ratio[moving].max() < 0.05
 
 
 # Rotating bodies
@@ -218,8 +402,9 @@ def whirl_frequencies(body: ReducedBody, speed: float) -> np.ndarray:
     return np.sort(found[found > 1.0])
 
 
-def test_gyroscopic_forces_of_a_shaft_follow_from_its_torsional_inertia(tmp_path: Path) -> None:
-    """Against a shaft reduced here with the exact gyroscopic matrix, at 12000 rpm: gyroscopic splitting within 2 %."""
+@pytest.fixture(scope="module")
+def shaft() -> tuple[dict[str, Any], ReducedBody]:
+    """A gearbox file with a shaft whose inertia is that of its shape, and this shaft reduced here."""
     content = shaped_shafts()
     body = assembled(Gearbox.from_dict(content, "case.toml"), Choice("flexible"), STIFFNESS).elastic_bodies["shaft_1"]
     inertia = body.shape_inertia
@@ -228,22 +413,112 @@ def test_gyroscopic_forces_of_a_shaft_follow_from_its_torsional_inertia(tmp_path
         "centre_of_mass_z_mm": 1e3 * inertia.centre[2],
     }  # fmt: skip
     exact = assembled(Gearbox.from_dict(content, "case.toml"), Choice("flexible"), STIFFNESS).elastic_bodies["shaft_1"]
-    content = copy.deepcopy(content)
-    keys = write(tmp_path, interface_of(exact.reduced), "dmig")
+    assert exact.main_seat == "torque"
+    return content, exact.reduced
+
+
+def shaft_of(folder: Path, shaft: tuple[dict[str, Any], ReducedBody], **external: Any) -> Gearbox:
+    """The same gearbox with the shaft from matrices."""
+    content, body = copy.deepcopy(shaft[0]), shaft[1]
+    keys = write(folder, interface_of(body), "dmig")
     del content["bodies"]["shaft_1"]["shape"]
-    seats = {"torque": {"node": 1 + [seat.name for seat in exact.reduced.seats].index("torque")}}
-    seats["belt"] = {"node": 1 + [seat.name for seat in exact.reduced.seats].index("belt")}
-    content["bodies"]["shaft_1"]["external"] = {**keys, "units": "SI", "torque_seat": "torque", "seats": seats}
-    gearbox = Gearbox.from_dict(content, str(tmp_path / "case.toml"))
+    numbers = {seat.name: number for number, seat in enumerate(body.seats, start=1)}
+    seats = {name: {"node": numbers[name]} for name in ("torque", "belt")}
+    content["bodies"]["shaft_1"]["external"] = {
+        **keys, "units": "SI", "torque_seat": "torque", "seats": seats, **external
+    }  # fmt: skip
+    return Gearbox.from_dict(content, str(folder / "case.toml"))
+
+
+def write_gyroscopic(folder: Path, body: ReducedBody, change: Any = lambda g: g) -> str:
+    """CSV file of the gyroscopic matrix of a body."""
+    written = replace(interface_of(body), mass=change(body.gyroscopic))
+    (folder / "gyroscopic.csv").write_bytes(csv_matrix_content(written, "mass"))
+    return "gyroscopic.csv"
+
+
+SPEED = 12000.0 * np.pi / 30.0
+
+
+def test_gyroscopic_forces_of_a_shaft_follow_from_its_torsional_inertia(
+    tmp_path: Path, shaft: tuple[dict[str, Any], ReducedBody]
+) -> None:
+    """Against a shaft reduced here with the exact gyroscopic matrix, at 12000 rpm: gyroscopic splitting within 2 %."""
+    gearbox, exact = shaft_of(tmp_path, shaft), shaft[1]
     found = assembled(gearbox, Choice("flexible"), STIFFNESS).elastic_bodies["shaft_1"]
-    assert found.main_seat == exact.main_seat == "torque"
-    speed = 12000.0 * np.pi / 30.0
+    assert found.main_seat == "torque"
     one, two, rest = (
-        whirl_frequencies(body.reduced, omega) for body, omega in ((found, speed), (exact, speed), (exact, 0.0))
+        whirl_frequencies(body, omega) for body, omega in ((found.reduced, SPEED), (exact, SPEED), (exact, 0.0))
     )
     below = two < 4000.0
     assert np.abs(one[below] / two[below] - 1.0).max() < 0.02 * np.abs(rest[below] / two[below] - 1.0).max()
     assert any("gyroscopic forces follow" in line for line in external_warnings(gearbox, "shaft_1"))
+
+
+def test_a_shaft_with_its_gyroscopic_matrix_whirls_as_it_does_when_reduced_here(
+    tmp_path: Path, shaft: tuple[dict[str, Any], ReducedBody]
+) -> None:
+    """All frequencies at 12000 rpm within the digits of the punch file."""
+    gearbox = shaft_of(tmp_path, shaft, gyroscopic=write_gyroscopic(tmp_path, shaft[1]))
+    check_external(gearbox, "shaft_1")
+    found = assembled(gearbox, Choice("flexible"), STIFFNESS).elastic_bodies["shaft_1"].reduced
+    wanted = whirl_frequencies(shaft[1], SPEED)
+    assert whirl_frequencies(found, SPEED) == pytest.approx(wanted, rel=1e-7)
+    assert np.abs(wanted / whirl_frequencies(shaft[1], 0.0) - 1.0).max() > 1e-3
+    assert not any("gyroscopic" in line for line in external_warnings(gearbox, "shaft_1"))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (np.tril, r"gyroscopic: not antisymmetric at node \d+, component \d and node \d+, component \d: 0 and"),
+        (np.abs, "write both triangles, with opposite signs"),
+        (np.transpose, "rigid tilts about x and y are coupled by -.* kg m2, but the polar inertia about z is"),
+        (lambda g: SPEED * g, "write the matrix per rad/s"),
+    ],
+)
+def test_a_gyroscopic_matrix_that_is_none_is_refused_with_the_place(
+    tmp_path: Path, shaft: tuple[dict[str, Any], ReducedBody], change: Any, message: str
+) -> None:
+    gearbox = shaft_of(tmp_path, shaft, gyroscopic=write_gyroscopic(tmp_path, shaft[1], change))
+    with pytest.raises(GearboxFileError, match=message) as refused:
+        check_external(gearbox, "shaft_1")
+    assert len(refused.value.errors) == 1
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_a_rotor_in_its_middle_tilts_at_the_frequencies_of_the_closed_form(tmp_path: Path, sense: float) -> None:
+    """Disc of J_p and J_t in the middle of an elastic shaft: w = g +- sqrt(g^2 + k/J_t) with g = J_p Omega / (2 J_t).
+
+    Equations of the rigid rotor J_t a'' + J_p Omega b' + k a = 0 and its counterpart (Genta, Dynamics of Rotating
+    Systems, 2005, ch. 2); k = 2 x 4 E I / l of two beams whose far ends are held.
+    """
+    places = np.array([[0.0, 0.0, -0.1], [0.0, 0.0, 0.0], [0.0, 0.0, 0.1]])
+    ends = [beam_matrices(places[n], places[n + 1], 0.02)[0] for n in range(2)]
+    stiffness = np.zeros((18, 18))
+    for n, matrix in enumerate(ends):
+        stiffness[6 * n : 6 * n + 12, 6 * n : 6 * n + 12] += matrix
+    polar, transverse = 0.02, 0.011
+    mass = np.diag(np.concatenate([np.full(6, 1e-6), [8.0, 8.0, 8.0, transverse, transverse, polar], np.full(6, 1e-6)]))
+    gyroscopic = np.zeros((18, 18))
+    gyroscopic[9, 10], gyroscopic[10, 9] = polar, -polar
+    body = InterfaceMatrices((1, 2, 3), places, (), mass, stiffness, gyroscopic)
+    in_mm = body.from_si("mm-t-s")
+    write(tmp_path, in_mm)
+    (tmp_path / "g.csv").write_bytes(csv_matrix_content(replace(in_mm, mass=in_mm.gyroscopic), "mass"))
+    files = MatrixFiles(file=tmp_path / "box.npz", gyroscopic=tmp_path / "g.csv")
+    turned = read_matrices(files).to_si("mm-t-s").moved(np.diag([-1.0, -1.0, 1.0]), (0.0, 0.0, 0.3))
+    held = np.arange(6, 12)
+    inverse = np.linalg.inv(turned.mass[np.ix_(held, held)])
+    k, g = turned.stiffness[np.ix_(held, held)], turned.gyroscopic[np.ix_(held, held)]
+    speed = sense * 2000.0
+    state = np.block([[np.zeros((6, 6)), np.eye(6)], [-inverse @ k, -speed * inverse @ g]])
+    found = np.linalg.eigvals(state).imag
+    tilt = 8.0 * STEEL * 0.02**4 / 12.0 / 0.1  # two beams with their far ends held: 4 E I / l each
+    half = polar * 2000.0 / (2.0 * transverse)
+    middle = np.hypot(half, np.sqrt(tilt / transverse))
+    for wanted in (middle + half, middle - half):
+        assert np.abs(found - wanted).min() < 1e-9 * wanted
 
 
 @pytest.mark.parametrize(
@@ -349,6 +624,8 @@ def test_sectors_that_are_not_named_or_not_at_the_centre_are_refused(
         ({"torque_seat": "top"}, r"torque_seat = 'top': no such seat; seats are bearing_1, bearing_2, foot"),
         ({"stated_mass_kg": 0.6}, r"stated_mass_kg = 0.6: the matrices have 0.58875 kg; check units and model"),
         ({"stated_centre_mm": [40.0, 0.0, -6.0]}, r"the matrices have their centre at \(37.5, .*, -6\) mm"),
+        ({"loss_factor": 0.02, "damping_time_s": 1e-6}, r"set either loss_factor or damping_time_s"),
+        ({"loss_factor": 2.0}, r"bodies.box.external.loss_factor"),
         ({"stiffness_name": "KUUX"}, r"no stiffness matrix named KUUX; matrices are stiffness, mass"),
     ],
 )  # fmt: skip
@@ -369,6 +646,7 @@ def test_a_body_that_cannot_be_is_one_error_with_its_key(
     [
         ({"flexibility": "ffrf", "fixed": False}, "flexibility 'ffrf' requires mass integrals"),
         ({"spin_only": True, "fixed": False}, "external matrices are for a body on a fixed axis or a fixed body"),
+        ({"fixed": False, "external": {"file": "box.npz", "units": "SI", "loss_factor": 0.02}}, "set damping_time_s"),
         ({"solid": {"file": "plate.vtu"}}, "set one of shape, solid and external"),
     ],
 )
@@ -461,7 +739,8 @@ def test_export_writes_what_the_gearbox_file_reads(tmp_path: Path) -> None:
     said = json.loads(out.stdout)
     assert said["mass_kg"] == pytest.approx(0.58875)
     assert [(seat["node"], seat["seat"]) for seat in said["seats"]] == [(1, "bearing_1"), (2, "bearing_2"), (3, "foot")]
-    assert said["files"] == [str(tmp_path / "box.pch")]
+    assert said["files"] == [str(tmp_path / "box.pch"), str(tmp_path / "box-surface.npz")]
+    assert said["keys"]["recovery"] == "box-surface.npz"
     del content["bodies"]["box"]["solid"]
     content["bodies"]["box"]["external"] = {**said["keys"], "units": said["units"], "seats": FOOT}
     case.write_text(toml(content), encoding="utf-8")

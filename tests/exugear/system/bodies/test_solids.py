@@ -230,7 +230,7 @@ def test_tetrahedra_and_hexahedra_of_a_tube_agree():
 
 @needs_meshio
 @pytest.mark.parametrize(
-    ("suffix", "options"), [(".msh", {"file_format": "gmsh"}), (".inp", {}), (".vtu", {}), (".vtk", {})]
+    ("suffix", "options"), [(".msh", {"file_format": "gmsh"}), (".inp", {}), (".bdf", {}), (".vtu", {}), (".vtk", {})]
 )
 @pytest.mark.parametrize("kind", ["tetra10", "tetra", "hexahedron20", "hexahedron"])
 def test_meshes_are_read_from_files(tmp_path, suffix, options, kind):
@@ -252,6 +252,47 @@ def test_meshes_are_read_from_files(tmp_path, suffix, options, kind):
     assert solid.scalar_mass.sum() == pytest.approx(2.0, rel=1e-12)
     moved = solid.stiffness @ solid.rigid_motions((0.0, 0.0, 0.0))
     assert np.abs(moved).max() < 1e-10 * np.abs(solid.stiffness).max()
+
+
+BULK = """GRID           1              0.      0.      0.
+GRID,2,,10.,0.,0.
+GRID*                  3                              0.             10.
+*                     0.
+GRID    4       0       0.      0.      1.+1
+PSOLID  1       1
+CTETRA  1       1       1       2       3       4
+"""
+
+
+@needs_meshio
+@pytest.mark.parametrize("start", ["", "SOL 103\nCEND\nBEGIN BULK\n"])
+@pytest.mark.parametrize("end", ["", "ENDDATA\n"])
+def test_nastran_bulk_data_in_all_fields_is_read_also_when_it_has_no_end(tmp_path, start, end):
+    """Volume of a tetrahedron with three edges of 10 mm: 1000 / 6 mm3."""
+    file = tmp_path / "corner.nas"
+    file.write_text(start + BULK + end, encoding="utf-8")
+    assert assemble(read_solid(file, unit=1e-3), Material(density=1.0)).scalar_mass.sum() == pytest.approx(1e-6 / 6.0)
+
+
+@needs_meshio
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("INCLUDE 'other.bdf'", r"line 8: refers to another file by INCLUDE"),
+        ("GRID           5       7      0.      0.      0.", r"line 8: the node is in the coordinate system 7"),
+        ("GRID,5,7,0.,0.,0.", r"line 8: the node is in the coordinate system 7"),
+        ("GRID*                  5               7", r"line 8: the node is in the coordinate system 7"),
+        ("CTETRA*                2               1               1               2", r"line 8: CTETRA[*] in fields"),
+        ("CTETRA  2       1       1       2       3       9", "meshio cannot read it as nastran"),
+        ("CTETRA  2       1       one     2       3       4", "meshio cannot read it as nastran"),
+        ("CPENTA  2       1       1       2       3       4       1       2", "contains tetra, wedge; a solid must"),
+    ],
+)
+def test_nastran_bulk_data_that_is_not_understood_is_refused_with_its_line(tmp_path, line, message):
+    file = tmp_path / "corner.bdf"
+    file.write_text(f"{BULK}{line}\n", encoding="utf-8")
+    with pytest.raises(SolidError, match=message):
+        read_solid(file)
 
 
 @needs_meshio

@@ -144,7 +144,7 @@ def test_a_mistake_is_told_with_key_value_and_what_it_is_compared_with(mistake: 
     assert sum(words in line for line in gearbox_warnings(gearbox)) == 1, gearbox_warnings(gearbox)
 
 
-@pytest.mark.parametrize("name", ["pair", "parallel", "planetary", "wind"])
+@pytest.mark.parametrize("name", ["pair", "parallel", "e-axle", "planetary", "wind"])
 def test_templates_raise_no_alarm(name: str) -> None:
     assert gearbox_warnings(Gearbox.from_dict(template(name))) == ()
 
