@@ -95,7 +95,7 @@ class MeasurementSection(Section):
     """A recorded run-up, which `exugear measured` compares with the steady-state response."""
 
     file: FileName
-    """Recording (UNV data set 58, CSV, WAV, HDF5 or netCDF), in the folder of the gearbox file."""
+    """Recording (UNV data set 58, CSV, WAV, HDF5, netCDF or MDF), in the folder of the gearbox file."""
     description: Text = ""
     """Description for the user."""
     tacho: TachoSection | None = None
