@@ -1,8 +1,8 @@
 """Measurement data format (ASAM MDF 3 and 4) by asammdf, an optional library, in a process of its own.
 
-A damaged file can hang or exhaust that library, since its blocks point to each other by addresses. The process that reads
-it therefore has limits of time and of memory, and hands over plain arrays in a folder that is deleted. Formulas in the
-file (algebraic conversions) are evaluated by the library; channels with one are refused.
+A damaged file can hang or exhaust that library, since its blocks point to each other by addresses. The process that
+reads it therefore has limits of time and of memory, and hands over plain arrays in a folder that is deleted. Formulas
+in the file (algebraic conversions) would be evaluated by the library; channels with one are refused.
 """
 
 from __future__ import annotations
@@ -93,10 +93,16 @@ def _in_another_process(
     path: Path, wanted: Sequence[str] | None, folder: Path, seconds: float, size: int
 ) -> list[Mapping[str, Any]]:
     """Read a file in a process with limits; return name, unit, and files of values and times of each channel."""
-    request = json.dumps({
-        "path": str(path.resolve()), "shown": str(path), "wanted": None if wanted is None else [*wanted], "folder": str(folder),
-        "memory": MEMORY_LIMIT + 12 * size, "seconds": seconds,
-    })  # fmt: skip
+    request = json.dumps(
+        {
+            "path": str(path.resolve()),
+            "shown": str(path),
+            "wanted": None if wanted is None else [*wanted],
+            "folder": str(folder),
+            "memory": MEMORY_LIMIT + 12 * size,
+            "seconds": seconds,
+        }
+    )
     command = [sys.executable, "-m", __name__]
     root = str(Path(__file__).parents[3])
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))}
@@ -134,7 +140,9 @@ def main() -> None:
     except MemoryError:
         answer = {"error": f"{path}: does not fit into memory; split the file, or export the channels alone"}
     except Exception as error:  # noqa: BLE001  asammdf raises what it likes about a damaged file
-        answer = {"error": f"{path}: is a damaged MDF file ({type(error).__name__}: {str(error)[:200]}); export it again"}
+        answer = {
+            "error": f"{path}: is a damaged MDF file ({type(error).__name__}: {str(error)[:200]}); export it again"
+        }
     sys.stdout.write("\n" + json.dumps(answer) + "\n")
 
 

@@ -201,7 +201,7 @@ def _turn(angle: Floats, order: float, turned: Floats, cosine: Floats, sine: Flo
 def _bin_sums(
     values: Floats, angle: Floats, weight: Floats, turn: float, orders: Floats, bounds: Integers, turned: Floats
 ) -> Complexes:
-    """Sums over bins of y exp(-i order a) da, and of their products with exp(i turn a) and its conjugate.
+    """Return sums over bins of y exp(-i order a) da, and of their products with exp(i turn a) and its conjugate.
 
     All orders of a bin are summed while its samples are in the cache.
     """

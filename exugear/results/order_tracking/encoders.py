@@ -1,8 +1,8 @@
 """Transmission error of a gear train from the pulses of two encoders, those of its input and of its output.
 
-The angle of each shaft is known at its pulses. A cubic spline through them has it at any time, and the difference of the
-output from the ideal ratio is the transmission error. Pulses are neither smoothed nor are their places learned: mesh
-orders are multiples of the orders of shafts, and what is learned of them is lost to the transmission error.
+The angle of each shaft is known at its pulses. A cubic spline through them has it at any time, and the difference of
+the output from the ideal ratio is the transmission error. Pulses are neither smoothed nor are their places learned:
+mesh orders are multiples of the orders of shafts, and what is learned of them is lost to the transmission error.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def check_lines(lines: int, order: float, name: str) -> None:
         )
 
 
-def transmission_error(first: Floats, second: Floats, ratio: float) -> Floats:
+def error_of_angles(first: Floats, second: Floats, ratio: float) -> Floats:
     """Transmission error as an angle of the output, rad, by the angles of input and output, without its mean.
 
     Parameters
@@ -87,7 +87,7 @@ def transmission_error(first: Floats, second: Floats, ratio: float) -> Floats:
     Examples
     --------
     >>> angle = np.linspace(0.0, 20.0, 1001)
-    >>> error = transmission_error(angle, 0.5 * angle + 1e-5 * np.cos(angle), -0.5)
+    >>> error = error_of_angles(angle, 0.5 * angle + 1e-5 * np.cos(angle), -0.5)
     >>> round(1e6 * float(np.ptp(error)), 1)
     20.0
     """

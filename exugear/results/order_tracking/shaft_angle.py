@@ -275,7 +275,7 @@ def _values_and_slopes(spline: BSpline, at: Floats) -> tuple[Floats, Floats]:
     """
     from scipy.interpolate import PPoly
 
-    pieces = PPoly.from_spline(spline)
+    pieces = PPoly.from_spline((spline.t, spline.c, spline.k))
     first = np.searchsorted(at, pieces.x)
     first[0], first[-1] = 0, at.size
     values, slopes = np.empty(at.size), np.empty(at.size)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from exugear.results.spectra.waterfall import OrderLine
-from exugear.steady.damping_band import damping_limits
 from exugear.steady.evaluation.comparison import mesh_lines, transfers_of
 from exugear.steady.evaluation.load_over_speed import LoadedModels
 from exugear.steady.evaluation.run_up import MeasuredRunUp
@@ -59,7 +59,7 @@ def damping_extremes(
     solved = ascending[resolving_places(ascending, transfer.reshape(-1, ascending.size).T, resolved)]
     found = np.zeros((2, *response["amplitude"].shape), dtype=np.complex64)
     for end in (0, 1):
-        damped = models.damped(lambda system, end=end: damping_limits(system)[end])
+        damped = models.damped(end)
         own = damped.amplitudes(np.sign(speed[0]) * solved, settings, harmonics, [*rows])
         found[end][:, places] = CubicSpline(solved, own[..., : len(names)])(np.abs(speed))
     return found
@@ -90,7 +90,7 @@ def resolving_places(at: Floats, values: Complexes, tolerance: float) -> Integer
     known = values[:, highest > 0.0] / highest[highest > 0.0]
     while places.size < at.size and known.size:
         error = np.abs(CubicSpline(at[places], known[places])(at) - known).max(axis=1)
-        gaps = [(low, high) for low, high in zip(places[:-1], places[1:], strict=True) if high - low > 1]
+        gaps = [(low, high) for low, high in pairwise(places) if high - low > 1]
         wrong = [(low + high) // 2 for low, high in gaps if error[low + 1 : high].max() > tolerance]
         if not wrong:
             break

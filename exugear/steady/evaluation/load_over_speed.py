@@ -1,9 +1,9 @@
 """Steady-state response of a run-up whose torque changes with its speed: each speed is solved at its own load.
 
-Bearings are stiffer under load, so that resonances shift with the torque, by 5 % of their speed for 30 %. Responses of a
-few loads cannot be interpolated then: the quadratic through those at 0.7, 1 and 1.3 times a torque is off by 1.1 to
-1.8 dB (rms) between them. Models at loads that differ by 4 % are linearly interpolated instead, each at the speeds whose
-torque is next to its own. Mesh stiffness follows from the tables of the mean torque, by their curves of load over
+Bearings are stiffer under load, so that resonances shift with the torque, by 5 % of their speed for 30 %. Responses of
+a few loads cannot be interpolated then: the quadratic through those at 0.7, 1 and 1.3 times a torque is off by 1.1 to
+1.8 dB (rms) between them. Models at loads that differ by 4 % are linearly interpolated instead, each at the speeds
+whose torque is next to its own. Mesh stiffness follows from the tables of the mean torque, by their curves of load over
 deflection.
 """
 
@@ -18,9 +18,9 @@ import numpy as np
 
 from exugear.steady.balance.excitation import HarmonicBalanceModel
 from exugear.steady.balance.response import signals
+from exugear.steady.damping_band import damping_limits
 from exugear.steady.evaluation.comparison import harmonic_rows, mesh_lines
 from exugear.steady.evaluation.run_up import MeasuredTorque
-from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.settings import SteadySettings
 from exugear.system.system import Assembly
@@ -50,7 +50,7 @@ def loads_of(torque: MeasuredTorque | None) -> tuple[float, ...]:
     >>> loads_of(MeasuredTorque.of("input", np.linspace(101.0, 99.0, 5000), speed))
     (1.0,)
     """
-    if torque is None or not 0.0 < torque.ends[0] * torque.ends[1]:
+    if torque is None or not torque.ends[0] * torque.ends[1] > 0.0:
         return (1.0,)
     ratio = torque.over_speed / torque.mean
     lowest, highest = float(ratio.min()), float(ratio.max())
@@ -88,9 +88,9 @@ class LoadedModels:
         models = [harmonic_balance_model(assembly_at(load), speeds, harmonics, settings.combinations) for load in loads]
         return cls(tuple(models), loads, torque)
 
-    def damped(self, system_of: Callable[[MeanSystem], MeanSystem]) -> LoadedModels:
-        """Return the same models with other matrices."""
-        return replace(self, models=tuple(own.with_system(system_of(own.system)) for own in self.models))
+    def damped(self, end: int) -> LoadedModels:
+        """Return the same models with the lowest (0) or the highest (1) plausible damping."""
+        return replace(self, models=tuple(own.with_system(damping_limits(own.system)[end]) for own in self.models))
 
     @property
     def signal_names(self) -> list[str]:

@@ -18,7 +18,7 @@ from exugear.gearbox.reading import known_names
 from exugear.gearbox.sections.measurements import MeasuredChannelSection, MeasurementSection, TachoSection
 from exugear.gearbox.units import MEASURED_UNITS, RPM, Unit, unit_of
 from exugear.results.order_tracking.angle_cuts import AngleWindow
-from exugear.results.order_tracking.encoders import check_lines, encoder_angle, transmission_error
+from exugear.results.order_tracking.encoders import check_lines, encoder_angle, error_of_angles
 from exugear.results.order_tracking.shaft_angle import ShaftAngle, SpeedSignalError, angle_of_speed, angle_of_tacho
 from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.settings import USUAL_COUNT, Method, SpeedRange, SteadySettings, check_speeds, usual_speeds
@@ -216,7 +216,9 @@ def read_run_up(gearbox: Gearbox, name: str | None = None) -> MeasuredRunUp:
     for own, channel in section.channels.items():
         if channel.encoders is not None:
             values.append(
-                _error_by_encoders(gearbox, f"{key}.channels.{own}.encoders", section, channel.encoders, recording, shaft)
+                _error_by_encoders(
+                    gearbox, f"{key}.channels.{own}.encoders", section, channel.encoders, recording, shaft
+                )
             )
             continue
         recorded = recording.channel(files[own][0])
@@ -353,7 +355,7 @@ def _error_by_encoders(
                 f"pulses_per_revolution, and the run-up has {expected:.5g}; check its lines, its channel and its shaft"
             )
         angles.append(angle)
-    return gearbox.output_radius * transmission_error(*angles, gearbox.train.ratio)
+    return gearbox.output_radius * error_of_angles(angles[0], angles[1], gearbox.train.ratio)
 
 
 def _unit(gearbox: Gearbox, key: str, stated: str | None, recorded: RecordedChannel, quantity: str) -> Unit:

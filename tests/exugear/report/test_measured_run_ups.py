@@ -50,7 +50,9 @@ def test_a_report_shows_a_comparison_of_its_gearbox_and_names_a_stale_one(tmp_pa
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize(("load_case", "below"), [(None, "at-measured-bench"), ("run_up", "at-run_up/at-measured-bench")])
+@pytest.mark.parametrize(
+    ("load_case", "below"), [(None, "at-measured-bench"), ("run_up", "at-run_up/at-measured-bench")]
+)
 def test_a_comparison_at_another_load_is_named_and_has_a_report_of_its_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, load_case: str | None, below: str
 ) -> None:

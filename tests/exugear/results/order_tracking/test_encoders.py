@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from exugear.results.order_tracking.angle_cuts import BANDWIDTH, AngleWindow, angle_cuts
-from exugear.results.order_tracking.encoders import check_lines, encoder_angle, transmission_error
+from exugear.results.order_tracking.encoders import check_lines, encoder_angle, error_of_angles
 from exugear.results.order_tracking.shaft_angle import ShaftAngle, SpeedSignalError
 from exugear.results.spectra.resonances import OrderCut
 from exugear.results.spectra.waterfall import OrderLine
@@ -41,7 +41,7 @@ def cut_of(wave: Callable[[np.ndarray, int], np.ndarray]) -> OrderCut:
     time = np.arange(first.size) / RATE
     angles = [encoder_angle(wave(own, lines), RATE, lines, time) for own, lines in ((first, 500), (second, 2400))]
     shaft = ShaftAngle(RATE, 0, first, speed)
-    ((cut,),) = angle_cuts(transmission_error(*angles, RATIO)[None], shaft, [OrderLine("mesh", ORDER)])
+    ((cut,),) = angle_cuts(error_of_angles(*angles, RATIO)[None], shaft, [OrderLine("mesh", ORDER)])
     return cut
 
 

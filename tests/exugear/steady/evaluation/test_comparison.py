@@ -189,9 +189,7 @@ BY_ENCODERS = {"quantity": "transmission_error", "encoders": ENCODERS}
 
 
 @pytest.mark.validation
-def test_a_transmission_error_by_encoders_is_that_of_the_model(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_transmission_error_by_encoders_is_that_of_the_model(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Angles of input and output at 200 kHz as smooth encoders have them; levels within 0.1 dB rms of the response."""
     monkeypatch.setattr(synthetic, "RATE", 200_000.0)
     _, speed, angle = synthetic.run_up(6.0)
@@ -235,7 +233,10 @@ def with_torque(**changes: Any) -> dict[str, Any]:
         (left(full_scale=5.0), "full_scale requires unit"),
         ({"channels": {"te": {"quantity": "transmission_error"}}}, "channel 'te' has no unit in the file.* set unit"),
         ({"channels": {"up": synthetic.CHANNELS["left"]}}, "no channel 'up'; "),
-        ({"channels": {"te": {**BY_ENCODERS, "unit": "um"}}}, "unit does not apply to a transmission error by encoders"),
+        (
+            {"channels": {"te": {**BY_ENCODERS, "unit": "um"}}},
+            "unit does not apply to a transmission error by encoders",
+        ),
         (left(encoders=ENCODERS), "encoders apply to the transmission error only; set quantity ="),
         (
             {"channels": {"te": {**BY_ENCODERS, "encoders": ENCODERS[::-1]}}},
@@ -247,7 +248,17 @@ def with_torque(**changes: Any) -> dict[str, Any]:
             "channels.te.encoders: channel 'left' counts .* revolutions of input with 400 .*; check its lines",
         ),
         (
-            {"channels": {"te": {**BY_ENCODERS, "encoders": [{**synthetic.TACHO, "pulses_per_revolution": 100}, {**ENCODERS[1], "channel": "te"}]}}},
+            {
+                "channels": {
+                    "te": {
+                        **BY_ENCODERS,
+                        "encoders": [
+                            {**synthetic.TACHO, "pulses_per_revolution": 100},
+                            {**ENCODERS[1], "channel": "te"},
+                        ],
+                    }
+                }
+            },
             "channels.te.encoders: channel 'tacho' has 1.5 lines in a period of 3 .* stage_1; at least 4 are required",
         ),
         (with_torque(body=None), 'body is required for torque; set body = "BODY"'),
