@@ -77,6 +77,9 @@ for finding in comparison.findings:
 # averaged in the same windows. The band is that of plausible damping.
 
 cuts = comparison.plot("error")
+picture = case.with_name("cuts.png")
+cuts.figure.savefig(picture)
+print(f"diagram in {picture}")
 
 # %%
 # Which numbers of the file explain it? Both are found within their intervals.

@@ -230,11 +230,10 @@ def _is_replaced(gearbox: Gearbox, name: str, digest: str) -> bool:
 
     Results are also looked at where the recording, which is much larger, is missing.
     """
-    from exugear.exchange.series_files import LARGEST_SERIES  # for measurements only
+    from exugear.steady.evaluation.run_up import recording_path  # for measurements only
 
-    key, section = f"measurements.{name}.file", gearbox.case.measurements[name]
     try:
-        return file_digest(gearbox.file(key, section.file, LARGEST_SERIES)) != digest
+        return file_digest(recording_path(gearbox, name)) != digest
     except (GearboxFileError, FileError):
         return False
 

@@ -180,6 +180,17 @@ def measurement_of(gearbox: Gearbox, name: str | None) -> tuple[str, Measurement
     return name, known[name]
 
 
+def recording_path(gearbox: Gearbox, name: str) -> Path:
+    """Path of the recording of a measurement.
+
+    Raises
+    ------
+    GearboxFileError
+        It does not exist or may not be read.
+    """
+    return gearbox.file(f"measurements.{name}.file", gearbox.case.measurements[name].file, LARGEST_SERIES)
+
+
 def read_run_up(gearbox: Gearbox, name: str | None = None) -> MeasuredRunUp:
     """Read a measured run-up that a gearbox file names.
 
@@ -195,7 +206,7 @@ def read_run_up(gearbox: Gearbox, name: str | None = None) -> MeasuredRunUp:
     """
     name, section = measurement_of(gearbox, name)
     key = f"measurements.{name}"
-    path = gearbox.file(f"{key}.file", section.file, LARGEST_SERIES)
+    path = recording_path(gearbox, name)
     source = section.tacho or section.speed
     assert source is not None  # checked with the section
     files = {own: _files_of(own, channel) for own, channel in section.channels.items()}

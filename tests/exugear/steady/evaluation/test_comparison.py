@@ -19,6 +19,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.units import RPM, STANDARD_GRAVITY
 from exugear.project import Project
+from exugear.steady.evaluation.fitted_response import response_levels
 from exugear.steady.evaluation.measured_comparison import MeasuredComparison, compare_run_up
 from exugear.steady.evaluation.mistakes import load_finding
 from exugear.steady.evaluation.run_up import MeasuredTorque, gearbox_at_torque, read_run_up, response_settings
@@ -545,6 +546,12 @@ def test_levels_of_a_torque_that_falls_with_the_speed_agree(tmp_path: Path) -> N
     (finding,) = [own for own in with_channel.findings if own.text.startswith("torque of input")]
     assert finding.level == "note"
     assert finding.text.endswith("; computed at the torque of each speed"), finding.text
+    loaded, cuts = project.at_measured_load(with_channel.cuts.run_up), with_channel.cuts
+    settings = response_settings(loaded.gearbox, cuts.run_up)
+    fitted = response_levels(loaded.assembly_at_loads(cuts.run_up), cuts, settings, with_channel.harmonics)
+    assert np.abs(fitted - 20.0 * np.log10(np.abs(cuts.computed)))[cuts.compared].max() < 0.2, (
+        "a fit has the loads, too"
+    )
     band = with_channel.cuts.limits
     assert band is not None
     level = np.abs(with_channel.cuts.computed)
