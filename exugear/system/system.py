@@ -59,6 +59,7 @@ from exugear.system.tooth_mesh.element import MeshElement
 from exugear.system.tooth_mesh.laws.mesh_forces import add_mesh_forces, add_mesh_jacobian, mesh_state
 from exugear.system.tooth_mesh.laws.stiffness import pack
 from fe_ste.tools.arrays import Complexes, Floats, Integers
+from fe_ste.tools.bundles import cached_bundle
 from fe_ste.tools.display import ReprMixin
 from fe_ste.transmission_error.surface import SteSurface
 
@@ -318,7 +319,7 @@ class Assembly(ReprMixin):
             elastic_slice = self.elastic_slices[name]
             f[elastic_slice] += body.forces(q[elastic_slice], v[elastic_slice])
         if self.modal is not None:
-            add_modal_damping(q, v, self.modal, modal_memory(self.modal), f)
+            add_modal_damping(q, v, cached_bundle(self.modal), modal_memory(self.modal), f)
         return f
 
     @cached_property

@@ -26,6 +26,7 @@ import numpy as np
 from exugear.system.kernels.coordinates import SPIN, TILT
 from exugear.system.kernels.products import TILE, add_symmetric
 from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.bundles import cached_bundle
 from fe_ste.tools.compilation import kernel
 from fe_ste.tools.octets import SIZE, aligned_zeros
 
@@ -68,8 +69,8 @@ def share_of_planet(i: int, j: int, count: int, cosine: float) -> float:
 
 
 @kernel
-def turn_planets(turned: Floats, modal: ModalArrays, back: bool, given: Floats, out: Floats) -> None:
-    """Set the planets' entries of `out` to S given, or to S^T given with `back`; others are left as they are.
+def turn_planets(turned: Floats, modal: ModalArrays, sense: float, given: Floats, out: Floats) -> None:
+    """Set the planets' entries of `out` to S given with the sense 1, to S^T given with -1; others stay as they are.
 
     `turned` has cosine and sine of the angle of each set's carrier, one after the other.
     """
@@ -77,7 +78,7 @@ def turn_planets(turned: Floats, modal: ModalArrays, back: bool, given: Floats, 
         begin = modal.first[s]
         count = modal.first[s + 1] - begin
         cosine = turned[2 * s]
-        sine = -turned[2 * s + 1] if back else turned[2 * s + 1]
+        sine = sense * turned[2 * s + 1]
         for a in range(count):
             own = modal.place[begin + a]
             # Sums over the planets stay in registers.
@@ -131,13 +132,13 @@ def add_modal_damping(q: Floats, v: Floats, modal: ModalArrays | None, memory: F
     for s in range(modal.frame.size):
         angle = q[modal.frame[s]] if modal.frame[s] >= 0 else 0.0
         turned[2 * s], turned[2 * s + 1] = math.cos(angle), math.sin(angle)
-    turn_planets(turned, modal, True, v, moved)
+    turn_planets(turned, modal, -1.0, v, moved)
     add_symmetric(modal.tiles, 0, acting.size, moved, acting)
     power = 0.0
     for i in range(size):
         power += moved[i] * acting[i]
         moved[i] = acting[i]
-    turn_planets(turned, modal, False, acting, moved)
+    turn_planets(turned, modal, 1.0, acting, moved)
     for i in range(size):
         f[i] -= moved[i]
     return power
@@ -156,7 +157,7 @@ def modal_matrix(q: Floats, modal: ModalArrays | None) -> Floats:
     if modal is not None:
         memory = modal_memory(modal)
         for rate, column in zip(np.eye(q.size), matrix, strict=True):  # the matrix is symmetric
-            add_modal_damping(q, -rate, modal, memory, column)
+            add_modal_damping(q, -rate, cached_bundle(modal), memory, column)
     return matrix
 
 

@@ -36,6 +36,7 @@ from exugear.system.kernels.varying_loads import VaryingLoadArrays, add_varying_
 from exugear.system.system import Assembly
 from exugear.transient.exudyn_model.library import elements, exudyn, items
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.bundles import cached_bundle
 
 Rotation = Literal["euler_parameters", "tait_bryan"]
 
@@ -203,7 +204,7 @@ class FloatingBodies:
             add_connector_forces(q, v, connectors, f)
             add_spring_forces(q, v, springs, f)
             if assembly.modal is not None:
-                add_modal_damping(q, v, assembly.modal, memory, f)
+                add_modal_damping(q, v, cached_bundle(assembly.modal), memory, f)
             for name, body in matrices.items():
                 of_body = assembly.elastic_slices[name]
                 deforming = v[of_body] - v[of_body][SPIN] * body.spin

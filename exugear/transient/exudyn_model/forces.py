@@ -25,6 +25,7 @@ from exugear.system.tooth_mesh.laws.registry import LAWS
 from exugear.transient.exudyn_model.bodies import Parts
 from exugear.transient.exudyn_model.library import exudyn, items
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.bundles import cached_bundle
 
 FREE_SPIN = [1, 1, 1, 1, 1, 0]
 """Axes that an ideal joint holds: all but the spin."""
@@ -207,7 +208,7 @@ def add_modal_element(parts: Parts) -> None:
 
     def force(mbs: Any, t: float, item: int, q: Any, v: Any) -> Floats:
         f = np.zeros(assembly.size)
-        add_modal_damping(np.array(q), np.array(v), modal, memory, f)
+        add_modal_damping(np.array(q), np.array(v), cached_bundle(modal), memory, f)
         return f
 
     def jacobian(mbs: Any, t: float, item: int, q: Any, v: Any, factor_q: float, factor_v: float) -> Floats:
@@ -310,7 +311,7 @@ def add_minimal_system(
         if meshes is not None:
             f += assembly.mesh_forces(q, v, meshes)
         if assembly.modal is not None:
-            add_modal_damping(q, v, assembly.modal, memory, f)
+            add_modal_damping(q, v, cached_bundle(assembly.modal), memory, f)
         return f @ motions
 
     # The drive's spring is in no jacobian, and gears that only roll have coordinates of their own.

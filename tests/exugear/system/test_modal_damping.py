@@ -104,7 +104,7 @@ def test_turning_planets_is_orthogonal_and_carries_each_into_the_place_of_the_ne
         columns = []
         for unit in np.eye(size):
             out = unit.copy()
-            turn_planets(cosine_and_sine, arrays, back, unit, out)
+            turn_planets(cosine_and_sine, arrays, -1.0 if back else 1.0, unit, out)
             columns.append(out)
         return np.array(columns).T
 

@@ -281,9 +281,9 @@ def pass_meshes(
         acting[:] = 0.0
         if tangent:
             memory[BY_Q:MEMORY] = 0.0
-        add_flank(q, v, m, 1, meshes, table, law_memory, memory, tangent)
-        if meshes.form[m] == TABLE_FORM:
-            add_flank(q, v, m, -1, meshes, table, law_memory, memory, tangent)
+        # One call in a loop: numba compiles a function once for each constant that it is given.
+        for side in range(1, -2 if meshes.form[m] == TABLE_FORM else 0, -2):
+            add_flank(q, v, m, side, meshes, table, law_memory, memory, tangent)
         add_friction(q, v, m, meshes, memory[ALONG], memory[ALONG_TURNING], state, acting)
         for i in range(STATE_SIZE if states.size > 0 else 0):
             states[m, i] = state[i]
