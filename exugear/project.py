@@ -368,11 +368,12 @@ class Project(ReprMixin):
         with time_noted(loaded.folder, f"measured {found.name}, {self.choice.variant}, {self.choice.mesh_model}"):
             stored = path.with_name(f"{path.stem}-steady.nc")
             at_mean = stored_or_computed(stored, assembly_at(1.0), settings, progress)
-            speeds, harmonics = at_mean["speed"].to_numpy(), int(at_mean.attrs["harmonics"])
-            torque = found.torque if method != "nonlinear" else None  # its states cannot be interpolated
-            models = LoadedModels.of(assembly_at, torque, speeds, harmonics, settings)
-            response = models.response(at_mean, settings, found.section.harmonics)
-            limits = damping_extremes(models, response, settings, found)
+            response, limits = at_mean, None
+            if method != "nonlinear":  # with another load or damping, it may lead to another state
+                speeds, harmonics = at_mean["speed"].to_numpy(), int(at_mean.attrs["harmonics"])
+                models = LoadedModels.of(assembly_at, found.torque, speeds, harmonics, settings)
+                response = models.response(at_mean, settings, found.section.harmonics)
+                limits = damping_extremes(models, response, settings, found)
             comparison = compare_run_up(loaded.gearbox, found, response, limits)
             comparison.write(path)
         return comparison

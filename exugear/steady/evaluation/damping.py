@@ -32,11 +32,11 @@ def damping_extremes(
     settings: SteadySettings,
     run_up: MeasuredRunUp,
     resolved: float = RESOLVED,
-) -> SingleComplexes | None:
+) -> SingleComplexes:
     """Amplitudes (2, points, lines, signals) of the compared orders with the lowest and the highest damping.
 
     They are solved at as many speeds as the compared orders of the channels need, and interpolated between them; other
-    orders are zero. None for the method `nonlinear`, where another damping may lead to another state.
+    orders are zero. The method `nonlinear`, where another damping may lead to another state, has no band.
 
     Parameters
     ----------
@@ -48,8 +48,6 @@ def damping_extremes(
     """
     from scipy.interpolate import CubicSpline
 
-    if settings.method == "nonlinear":
-        return None
     speed, harmonics = response["speed"].to_numpy(), run_up.section.harmonics
     rows = mesh_lines(response, harmonics)
     lines = [OrderLine(name, float(response["order"][row])) for name, row in rows.items()]

@@ -43,6 +43,7 @@ from exugear.steady.evaluation.mistakes import (
     speed_finding,
 )
 from exugear.steady.evaluation.run_up import MeasuredRunUp
+from exugear.steady.steady_file import settings_of
 from fe_ste.tools.arrays import SingleComplexes
 from fe_ste.tools.display import ReprMixin, TitledRows
 from fe_ste.tools.drawing import (
@@ -354,7 +355,7 @@ def compare_run_up(
     found: Sequence[Iterator[Finding]] = (
         speed_finding(gearbox, run_up, spectrum),
         recording_findings(run_up),
-        load_finding(run_up),
+        load_finding(run_up, settings_of(response.attrs).method),
         band_findings(cuts),
         drift_finding(cuts),
         level_findings(cuts),

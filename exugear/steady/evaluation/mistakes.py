@@ -28,6 +28,7 @@ from exugear.results.order_tracking.foreign_orders import (
 from exugear.steady.evaluation.comparison import ComparedCuts
 from exugear.steady.evaluation.load_over_speed import loads_of
 from exugear.steady.evaluation.run_up import INTEGRATIONS, MeasuredRunUp
+from exugear.steady.settings import Method
 from fe_ste.tools.arrays import Floats
 
 CLIPPED = 1e-4
@@ -96,10 +97,14 @@ def band_findings(cuts: ComparedCuts) -> Iterator[Finding]:
         )
 
 
-def load_finding(run_up: MeasuredRunUp) -> Iterator[Finding]:
+def load_finding(run_up: MeasuredRunUp, method: Method = "parametric") -> Iterator[Finding]:
     """Yield the torque of the run-up, how much it varies, and how the computed side takes it.
 
     Forces of a varying mesh stiffness are proportional to the torque, thus levels to its logarithm.
+
+    Parameters
+    ----------
+    method : of the response; states of `nonlinear` are those at the mean torque
     """
     if run_up.torque is None:
         return
@@ -109,8 +114,7 @@ def load_finding(run_up: MeasuredRunUp) -> Iterator[Finding]:
         remedy = "it changes its sign, so that teeth separate: measure at a steady load"
         yield Finding("warning", f"{text}; computed at the mean; {remedy}", mean)
         return
-    loads = loads_of(run_up.torque)
-    if len(loads) > 1:
+    if method != "nonlinear" and len(loads_of(run_up.torque)) > 1:
         yield Finding("note", f"{text}; computed at the torque of each speed", mean)
         return
     changes = sorted(20.0 * math.log10(end / mean) for end in (low, high))
