@@ -314,7 +314,7 @@ def test_what_is_no_file_is_refused_without_waiting(tmp_path):
             read_recording(tmp_path / name)
     (tmp_path / "a.tdms").write_bytes(b"TDSm")
     with pytest.raises(RecordingError, match="ends in .tdms; recordings end in .unv"):
-        read_recording(tmp_path / "a.mf4")
+        read_recording(tmp_path / "a.tdms")
 
 
 @pytest.mark.parametrize("bits", [8, 12, 16, 24])

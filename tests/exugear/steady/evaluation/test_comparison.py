@@ -519,17 +519,18 @@ def test_levels_of_another_load_agree_where_the_torque_is_measured(tmp_path: Pat
 
 
 @pytest.mark.validation
-def test_levels_of_a_torque_that_falls_with_the_speed_agree(tmp_path: Path) -> None:
-    """From 1.3 to 0.7 times the mean: within 0.1 dB rms, and 1 dB off at the mean alone.
+@pytest.mark.parametrize(("spread", "off"), [(0.15, 0.3), pytest.param(0.3, 1.0, marks=pytest.mark.long)])
+def test_levels_of_a_torque_that_falls_with_the_speed_agree(tmp_path: Path, spread: float, off: float) -> None:
+    """From 1.15 to 0.85 (1.3 to 0.7) times the mean: within 0.1 dB rms, and 0.3 (1) dB off at the mean alone.
 
-    The signals are those of 13 loads, 5 % apart, with linear interpolation over the torque of each instant. Bearings
-    are stiffer under load, and resonances shift by 5 % to either side.
+    The signals are those of loads 5 % apart, with linear interpolation over the torque of each instant. Bearings are
+    stiffer under load, and resonances shift by 2.5 (5) % to either side.
     """
     time, speed, angle = synthetic.run_up(20.0)
     gearbox = Gearbox.from_dict(synthetic.content())
     mean = gearbox.train.static_torques["input"]
-    share = 1.3 - 0.6 * (speed - speed.min()) / np.ptp(speed)
-    steps = np.linspace(0.7, 1.3, 13)
+    share = 1.0 + spread - 2.0 * spread * (speed - speed.min()) / np.ptp(speed)
+    steps = np.linspace(1.0 - spread, 1.0 + spread, round(40 * spread) + 1)
     signals = {name: np.zeros(angle.size) for name in synthetic.CHANNELS}
     for number, step in enumerate(steps):
         loaded = gearbox.varied(
@@ -544,7 +545,7 @@ def test_levels_of_a_torque_that_falls_with_the_speed_agree(tmp_path: Path) -> N
     project = Project.from_toml(path, tmp_path / "r", synthetic.CHOICE)
     with_channel, at_mean = project.measured("bench"), project.measured("bench_2")
     assert with_channel.cuts.deviation() < 0.1
-    assert at_mean.cuts.deviation() > 1.0
+    assert at_mean.cuts.deviation() > off
     (finding,) = [own for own in with_channel.findings if own.text.startswith("torque of input")]
     assert finding.level == "note"
     assert finding.text.endswith("; computed at the torque of each speed"), finding.text
