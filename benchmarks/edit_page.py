@@ -22,7 +22,13 @@ from exugear.gearbox.templates.kinds import KINDS, template
 
 PAGE = ROOT / "docs" / "howto" / "editor_in_the_browser.md"
 MARKS = ("<!-- figures of benchmarks/edit_page.py -->", "<!-- end of figures -->")
-STEPS = {"check": "errors, kinematics", "picture": "picture", "dynamics": "modes, Campbell diagram", "loads": "loads"}
+STEPS = {
+    "check": "errors, kinematics",
+    "picture": "picture",
+    "dynamics": "Campbell diagram",
+    "loads": "loads",
+    "shapes": "mode shapes",
+}
 ROUNDS = 7
 #: Notes when a key is pressed, and when each part is no longer grey.
 WATCH = """() => {

@@ -60,8 +60,12 @@ def check_allow_dir(folder: Path | None) -> None:
         )
 
 
-def assembled_by_iso(gearbox: Gearbox, variant: Variant) -> Assembly:
+def assembled_by_iso(gearbox: Gearbox, variant: Variant, like: Assembly | None = None) -> Assembly:
     """Assemble a variant with rigid bodies and the mesh stiffness of ISO 6336-1, which requires no finite elements.
+
+    Parameters
+    ----------
+    like : assembly of a similar gearbox, for a shorter search for the static state
 
     Raises
     ------
@@ -71,7 +75,7 @@ def assembled_by_iso(gearbox: Gearbox, variant: Variant) -> Assembly:
     law = "iso6336"
     rigid = Variant.bushing if variant.is_elastic else variant
     with model_errors():
-        return assemble(gearbox, Choice(rigid, law), mesh_stiffness(gearbox, law))
+        return assemble(gearbox, Choice(rigid, law), mesh_stiffness(gearbox, law), like=like)
 
 
 def steady_lack(assembly: Assembly, variant: Variant) -> str:

@@ -40,6 +40,7 @@ def assemble(
     flanks: Mapping[str, int] | None = None,
     angles: Angles = "reference",
     contact: Mapping[str, MeshContactState] | None = None,
+    like: Assembly | None = None,
 ) -> Assembly:
     """Assemble the equations of motion of a gearbox.
 
@@ -53,6 +54,9 @@ def assemble(
         `exugear.system.bodies.of_gearbox` gives them.
     flanks, angles, contact
         As in `exugear.system.tooth_mesh.element.mesh_elements`.
+    like
+        Assembly of a similar gearbox: if it has the same coordinates, the search for the static state begins at that
+        of it.
 
     Raises
     ------
@@ -118,7 +122,7 @@ def assemble(
         motions=_rolling_motions(gearbox, coordinates) if only_rolls else np.eye(size),
         rows_stiffness=np.zeros((len(supports), 6, 6)),
     )
-    return with_modal_damping(linearise_at_static_load(assembly))
+    return with_modal_damping(linearise_at_static_load(assembly, like))
 
 
 def _chosen_bodies(names: tuple[str, ...], bodies: Mapping[str, ElasticBody]) -> dict[str, ElasticBody]:

@@ -64,10 +64,14 @@ def free_motion(gearbox: Gearbox, variant: str) -> str:
         return "no bearing supports a body"
     # Each row of one length: how stiff a support is does not matter, only that it holds.
     # The triangle has the same singular values and right vectors as the rows, of which there are many more.
-    triangle = np.linalg.qr(rows / np.linalg.norm(rows, axis=1, keepdims=True), mode="r")
-    _, singular, basis = np.linalg.svd(triangle)
-    free = basis[int(np.sum(singular > FREE_STRETCH * singular[0])) :]
+    triangle = np.asarray(np.linalg.qr(rows / np.linalg.norm(rows, axis=1, keepdims=True), mode="r"))
     rolling = _rolling_motions(gearbox, moving, starts)
+    singular = np.linalg.svd(triangle, compute_uv=False)
+    held = int(np.sum(singular > FREE_STRETCH * singular[0]))
+    stretch = np.linalg.norm(triangle @ rolling.T, axis=0).max(initial=0.0)
+    if held + len(rolling) == triangle.shape[1] and stretch <= FREE_STRETCH * singular[0]:
+        return ""  # as many free motions as ways to roll, and these are free: there are no others
+    free = np.linalg.svd(triangle)[2][held:]
     beyond = free - free @ rolling.T @ rolling
     amount = np.linalg.norm(beyond, axis=1)
     if not amount.size or amount.max() < ROLLING_TOLERANCE:

@@ -178,10 +178,24 @@ def real_modes(mass: Floats, stiffness: Floats, motions: Floats) -> tuple[Floats
 
     Only the symmetric part of the stiffness is used. `motions` (size, n) are the free motions.
     """
-    root = np.linalg.cholesky(mass)
-    free = np.linalg.solve(root.T, scipy.linalg.orth(root.T @ motions))
+    free = unit_mass_motions(mass, motions)
     values, vectors = np.linalg.eigh(free.T @ (0.5 * (stiffness + stiffness.T)) @ free)
     return np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi), free @ vectors
+
+
+def unit_mass_motions(mass: Floats, motions: Floats) -> Floats:
+    """Return a basis (size, n) of free motions (size, n) in which the mass matrix is the unit matrix.
+
+    Examples
+    --------
+    >>> unit_mass_motions(np.diag([4.0, 1.0]), np.eye(2))
+    array([[0.5, 0. ],
+           [0. , 1. ]])
+    """
+    root = np.linalg.cholesky(mass)
+    if motions.shape[0] == motions.shape[1]:  # all motions: the unit vectors are a basis already
+        return np.asarray(scipy.linalg.solve_triangular(root.T, np.eye(len(mass))))
+    return np.asarray(scipy.linalg.solve_triangular(root.T, scipy.linalg.orth(root.T @ motions)))
 
 
 def _arrays(assembly: Assembly, damping: Floats) -> ModalArrays:

@@ -26,6 +26,7 @@ from exugear.system.build import assemble
 from exugear.system.diagrams import draw_campbell, draw_energies
 from exugear.system.kernels.coordinates import SPIN
 from exugear.system.kernels.meshes import STIFFNESS, TILT_COLUMNS, TILT_STIFFNESS
+from exugear.system.modal_damping import unit_mass_motions
 from exugear.system.statics import RIGID_BODY_LIMIT, Linearised, linearise, meshes_near_unconverged, static_state
 from exugear.system.system import Assembly, input_hash
 from exugear.system.tooth_mesh.element import Angles, MeshData
@@ -629,10 +630,7 @@ def undamped_modes(mass: Floats, stiffness: Floats, motions: Floats | None = Non
     pair that differs from real by round-off; its real and imaginary parts span the same plane. `motions` (size, n) are
     those that are free, all by default.
     """
-    # In coordinates with unit mass the problem is an ordinary one; only in free motions, an orthonormal basis of them.
-    root = np.linalg.cholesky(mass)
-    basis = scipy.linalg.orth(root.T @ (np.eye(len(mass)) if motions is None else motions))
-    free = np.linalg.solve(root.T, basis)
+    free = unit_mass_motions(mass, np.eye(len(mass)) if motions is None else motions)
     values, vectors = scipy.linalg.eig(free.T @ stiffness @ free)
     shapes = free @ np.where(values.imag < 0.0, vectors.imag, vectors.real)
     order = np.argsort(values.real)

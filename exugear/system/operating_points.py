@@ -13,15 +13,16 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Bearing, Body
+from exugear.gearbox.sections.connections import CatalogueSection
 from exugear.gearbox.units import optional_si, si
 from exugear.system.bearings.duty import BearingLoadState, OperatingPoint, duty_of, operating_point
 from exugear.system.bearings.rolling.catalogue import catalogue_rows
@@ -70,12 +71,13 @@ class _SupportState(NamedTuple):
     """Operating points, None for supports that are not from a catalogue."""
 
 
-def linearise_at_static_load(assembly: Assembly) -> Assembly:
+def linearise_at_static_load(assembly: Assembly, like: Assembly | None = None) -> Assembly:
     """Give catalogue bearings of an assembly the laws that they have under the static load of the gearbox file.
 
     Parameters
     ----------
     assembly : one whose catalogue bearings have their nominal stiffness
+    like : one of a similar gearbox, from whose static state the search begins if it has the same coordinates
 
     Returns
     -------
@@ -92,6 +94,8 @@ def linearise_at_static_load(assembly: Assembly) -> Assembly:
     assembly, near = _with_contacts(assembly)
     if not any(is_catalogued(support) for support in assembly.supports):
         return assembly
+    if near is None and like is not None and like.known_rest and like.coordinates == assembly.coordinates:
+        near = like.known_rest[0]
     q, searched = _loaded_state(assembly, near)
     nominal = _points(assembly, searched, assembly.support_strains(q))
     resting, laws = _resting(assembly, nominal)
@@ -324,14 +328,24 @@ def bearing_points(assembly: Assembly) -> tuple[OperatingPoint, ...]:
 
 def _stated_point(bearing: Bearing) -> OperatingPoint:
     """Operating point of a bearing whose load the file states: along x, the stiffness the same in all directions."""
-    assert bearing.catalogue is not None and bearing.catalogue.radial_load_kN is not None
-    force = (si(bearing.catalogue, "radial_load_kN"), 0.0, optional_si(bearing.catalogue, "axial_load_kN") or 0.0)
-    displacement = equilibrium(BearingOfRows(catalogue_rows(bearing.catalogue)), force).displacement
+    assert bearing.catalogue is not None
+    displacement = _stated_displacement(bearing.catalogue)
     return replace(operating_point(bearing, displacement, False), stiffness=catalogue_stiffness(bearing.catalogue))
 
 
-def bearing_duties(assembly: Assembly) -> tuple[BearingLoadState, ...]:
+@lru_cache(maxsize=64)
+def _stated_displacement(section: CatalogueSection) -> Floats:
+    """Displacement (6,) of a bearing under the load that the file states."""
+    force = (si(section, "radial_load_kN"), 0.0, optional_si(section, "axial_load_kN") or 0.0)
+    return equilibrium(BearingOfRows(catalogue_rows(section)), force).displacement
+
+
+def bearing_duties(assembly: Assembly, one_of_a_set: bool = False) -> tuple[BearingLoadState, ...]:
     """Find what all catalogue bearings of an assembly bear under the static load of its gearbox file.
+
+    Parameters
+    ----------
+    one_of_a_set : whether the bearings of the first planet of a set stand for those of the others
 
     Raises
     ------
@@ -340,7 +354,10 @@ def bearing_duties(assembly: Assembly) -> tuple[BearingLoadState, ...]:
     BearingError
         A stated load that a bearing cannot hold.
     """
-    points = bearing_points(assembly)
+    points: Iterable[OperatingPoint] = bearing_points(assembly)
+    if one_of_a_set:
+        points = {point.bearing.family: point for point in reversed(tuple(points))}.values()
+        points = tuple(points)[::-1]
     reactions = reaction_loads(assembly) if any(is_stated(point.bearing) for point in points) else {}
     opposed = opposed_bearings(assembly.gearbox)
     return tuple(

@@ -22,7 +22,7 @@ from exugear.system.bearings.rolling.contact import LEAST_SHOULDER
 from exugear.system.bearings.stiffness import holds_one_way
 from exugear.system.bodies.turning_frame import TurningBody
 from exugear.system.diagrams import draw_misalignment
-from exugear.system.kernels.connectors import add_connector_tangents
+from exugear.system.kernels.connectors import add_connector_stiffness, connector_tangents
 from exugear.system.kernels.coordinates import SpringArrays, add_spring_forces
 from exugear.system.kernels.meshes import FORCE, OUTSIDE, MeshArrays
 from exugear.system.kernels.modal_damping import modal_matrix
@@ -75,11 +75,9 @@ def linearise(assembly: Assembly, q: Floats, meshes: MeshArrays | None = None) -
     for n, name in enumerate(assembly.mesh_names):
         jq, jv = assembly.mesh_jacobians(q, rest, averaged.one(n))
         stiffness[name], damping[name] = -jq, -jv
-    steps = _connector_steps(assembly)
-    number = np.arange(len(assembly.connector_names))
-    for n, name in enumerate(assembly.connector_names):
-        stiffness[name], damping[name] = np.zeros((assembly.size,) * 2), np.zeros((assembly.size,) * 2)
-        add_connector_tangents(q, steps * (number == n), assembly.connectors, stiffness[name], damping[name])
+    of_connectors = connector_tangents(q, _connector_steps(assembly), assembly.connectors)
+    for name, tangents in zip(assembly.connector_names, of_connectors, strict=True):
+        stiffness[name], damping[name] = tangents
     for n, name in enumerate(assembly.spring_names):
         spring = SpringArrays._make(values[n : n + 1] for values in assembly.springs)
         stiffness[name], damping[name] = _tangents(assembly.size, q, spring, add_spring_forces)
@@ -104,7 +102,7 @@ def tangent_stiffness(assembly: Assembly, q: Floats, meshes: MeshArrays) -> Floa
     """
     rest = np.zeros(assembly.size)
     stiffness = -assembly.mesh_jacobians(q, rest, meshes)[0]
-    add_connector_tangents(q, _connector_steps(assembly), assembly.connectors, stiffness)
+    add_connector_stiffness(q, _connector_steps(assembly), assembly.connectors, stiffness)
     for i, (first, second) in enumerate(assembly.springs.coordinates):
         for one, other in ((first, second), (second, first)):
             stiffness[one, one] += assembly.springs.stiffness[i]

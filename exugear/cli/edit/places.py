@@ -6,7 +6,7 @@ import json
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from typing import Literal
 
 from exugear.gearbox.sections.schema.keys import keys
@@ -109,8 +109,14 @@ def placed(texts: Iterable[str], kind: Literal["error", "warning"], source: str,
     >>> placed(["x.toml: gears.sun.teth: unknown key; did you mean 'teeth'?"], "error", "x.toml", "gears.sun.teth = 2")
     [Remark(text="gears.sun.teth: unknown key; did you mean 'teeth'?", kind='error', line=1, old='teth', new='teeth')]
     """
-    known = places(text)
+    known = _known_places(text)
     return [_placed(message.removeprefix(f"{source}: "), kind, text, known) for message in texts]
+
+
+@lru_cache(maxsize=2)
+def _known_places(text: str) -> Mapping[str, int]:
+    """Places of a text whose messages come step by step."""
+    return places(text)
 
 
 def _placed(message: str, kind: Literal["error", "warning"], text: str, known: Mapping[str, int]) -> Remark:

@@ -191,7 +191,7 @@ class Handler(BaseHTTPRequestHandler):
             server.file.latest = text
             self._send_steps(server.analyst.steps(text, tab, geometry))
         elif path == "save":
-            server.file.save(str(content.get("text", "")), str(content.get("digest", "")))
+            self._save(str(content.get("text", "")), str(content.get("digest", "")))
             self._send_json(server.file.told())
         elif path == "start" and content.get("kind") in KINDS:
             self._start(str(content["kind"]))
@@ -201,6 +201,16 @@ class Handler(BaseHTTPRequestHandler):
             self._send_json({"work": server.work.told()})
         else:
             raise RefusedError(HTTPStatus.NOT_FOUND, "no such page")
+
+    def _save(self, text: str, digest: str) -> None:
+        try:
+            self.server.file.save(text, digest)
+        except OSError as error:
+            reason = f"{error.filename or self.server.file.case}: {error.strerror or error}"
+            raise RefusedError(
+                HTTPStatus.INTERNAL_SERVER_ERROR,
+                f"The file was not saved and has its earlier content ({reason}). The text is still in this page.",
+            ) from error
 
     def _start(self, kind: str) -> None:
         """Start a long computation of the saved file."""

@@ -1,4 +1,4 @@
-"""Results of the text of a gearbox file, step by step: errors and kinematics, picture, modes, static loads.
+"""Results of the text of a gearbox file, step by step: errors, kinematics, picture, modes, static loads, shapes.
 
 Mesh stiffness is that of ISO 6336-1 and bodies are rigid, so that no finite elements are needed. Nothing is written.
 """
@@ -61,7 +61,7 @@ MESHES = (
     Column("mesh force kN", "force_kN", partial(significant, digits=3)),
     Column("misalignment mrad", "misalignment_mrad", ".3f"),
     Column("gap at +z end µm", "opening_um", ".1f"),
-    Column("centre distance µm", "centre_distance_change_um", ".1f"),
+    Column("change of centre distance µm", "centre_distance_change_um", ".1f"),
 )
 MODES = (
     Column("No.", "number"),
@@ -99,6 +99,7 @@ class Analyst:
         self._kept: dict[str, list[dict[str, Any]]] = {}
         self._latest: dict[str, object] = {}
         self._picture: dict[str, Any] = {"geometry": ""}
+        self._assembly: Assembly | None = None
 
     def steps(self, text: str, tab: str = "", geometry: str = "") -> Generator[dict[str, Any]]:
         """Yield the results of a text step by step; a newer request of the same tab ends an older one.
@@ -111,7 +112,8 @@ class Analyst:
         Yields
         ------
         dict
-            For JSON, with the key ``step``: ``check``, ``picture``, ``dynamics`` and ``loads``, or ``superseded``.
+            For JSON, with the key ``step``: ``check``, ``picture``, ``dynamics``, ``loads`` and ``shapes``, or
+            ``superseded``.
         """
         request = self.ask(tab)
         digest = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
@@ -149,14 +151,15 @@ class Analyst:
                 bodies = rigid_bodies(checked.gearbox)
                 yield self._pictured(bodies, Labels(checked.gearbox).labels)
                 variant = usual_variant(checked.gearbox)
-                assembly = assembled_by_iso(checked.gearbox, variant)
+                self._assembly = assembly = assembled_by_iso(checked.gearbox, variant, self._assembly)
                 modes = modes_of(assembly)
                 warnings = self._warnings([unusual_damping(modes)], text)
-                yield {"step": "dynamics", **dynamics(modes), **motions(modes, bodies), "remarks": warnings}
+                yield {"step": "dynamics", **dynamics(modes), "remarks": warnings}
                 tables, remarks = loads(assembly)
                 unavailable = "" if assembly.variant.has_bearings else lacking(checked.gearbox, Variant.bushing)
                 warnings = self._warnings(remarks, text)
                 yield {"step": "loads", "tables": tables, "unavailable": unavailable, "remarks": warnings}
+                yield {"step": "shapes", "tables": {"modes": _mode_table(modes)}, **motions(modes, bodies)}
         except (BadInputError, FailedError) as error:
             errors = placed(str(error).splitlines(), "error", self._source, text)
             yield {"step": "dynamics", "failed": True, "remarks": [asdict(remark) for remark in errors]}
@@ -256,14 +259,13 @@ def _family(gearbox: Gearbox, name: str) -> str:
 
 
 def dynamics(modes: Modes) -> dict[str, Any]:
-    """Return modes and the Campbell diagram; the mode shown first is that with the largest share within it."""
+    """Return the Campbell diagram; the mode shown first is that with the largest share within it."""
     diagram = modes.campbell()
     inside = diagram.seen[modes.frequency[diagram.seen] <= diagram.top]
     first = inside[np.argmax(modes.overall[inside])] if inside.size else np.argmax(modes.overall)
     return {
         "failed": False,
         "model": f"{modes.assembly.variant}, mesh stiffness to ISO 6336-1, rigid bodies",
-        "tables": {"modes": _mode_table(modes)},
         "campbell": campbell(modes, diagram),
         "first": int(first),
     }
@@ -272,14 +274,11 @@ def dynamics(modes: Modes) -> dict[str, Any]:
 def loads(assembly: Assembly) -> tuple[dict[str, Any], list[str]]:
     """Return the tables of bearings and meshes under the static load, and warnings about the bearings."""
     state = static_state(assembly) if assembly.variant.has_bearings else None
-    duties = bearing_duties(assembly) if any(bearing.catalogue for bearing in assembly.gearbox.bearings) else ()
-    rows = [
-        {**duty_summary(duty), "key": f"bearings.{duty.family}"}
-        for duty in {duty.family: duty for duty in reversed(duties)}.values()
-    ]
+    duties = bearing_duties(assembly, one_of_a_set=True)
+    rows = [{**duty_summary(duty), "key": f"bearings.{duty.family}"} for duty in duties]
     columns = [column for column in bearings_task.BEARINGS if not column.is_detail]
     tables = {
-        "bearings": table_data(columns, rows[::-1], legend=bearings_task.LEGEND),
+        "bearings": table_data(columns, rows, legend=bearings_task.LEGEND),
         "meshes": table_data(MESHES, _mesh_rows(state) if state else []),
     }
     return tables, [f"bearings.{duty.family}: {remark}" for duty in duties for remark in duty.remarks]

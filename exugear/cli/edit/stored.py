@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import threading
 import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +14,11 @@ from exugear.gearbox.named_files import LARGEST_CASE, LARGEST_MATRICES, NamedFil
 from exugear.gearbox.reading import GearboxFileError, read_text
 from exugear.results.folder import REPORT_FILE, content_digest, times_spent
 from fe_ste.tools.files import write_file
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
 
 STEPS_OF_RESULTS = {
     "tables": ("tables", "steady"),
@@ -42,6 +50,7 @@ class EditedFile:
         self.folder = folder
         self.latest: str | None = None
         """Last text that a page sent for its check."""
+        self._saving = threading.Lock()
 
     def text(self) -> str:
         """Read the file with line ends of the page; empty if it is empty or cannot be read."""
@@ -63,19 +72,26 @@ class EditedFile:
         FileConflictError
             The file has another content.
         """
-        if digest != digest_of(self.text()):
-            raise FileConflictError(f"{self.case.name} was changed by another program or page after it was read here")
         content = text.encode("utf-8", "surrogatepass")
         if len(content) > LARGEST_CASE:
             raise GearboxFileError(f"{self.case}: at most {1e-6 * LARGEST_CASE:.0f} MB can be saved")
-        if self.case.is_file() and b"\r\n" in self.case.read_bytes():
-            content = content.replace(b"\n", b"\r\n")
-        write_file(self.case, content)
+        with self._saving, _locked(self.case):
+            if digest != digest_of(self.text()):
+                raise FileConflictError(
+                    f"{self.case.name} was changed by another program or page after it was read here"
+                )
+            if self.case.is_file() and b"\r\n" in self.case.read_bytes():
+                content = content.replace(b"\n", b"\r\n")
+            write_file(self.case, content)
 
     def keep_unsaved(self) -> Path | None:
-        """Write the last text of a page into the results folder if it is not that of the file; return its path."""
-        if self.latest is None or self.latest == self.text():
-            return None
+        """Write the last text of a page into the results folder if it is not that of the file; return its path.
+
+        Saving that has begun is completed before.
+        """
+        with self._saving:
+            if self.latest is None or self.latest == self.text():
+                return None
         self.folder.mkdir(parents=True, exist_ok=True)
         path = self.folder / UNSAVED_FILE
         write_file(path, self.latest.encode("utf-8", "replace"))
@@ -105,6 +121,17 @@ class EditedFile:
             if digests and (kind != "report" or (self.folder / REPORT_FILE).is_file()):
                 states[kind] = "current" if content and content in digests else "old"
         return states
+
+
+@contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """Let one server at a time compare and replace a file; a later one then finds the new content."""
+    if fcntl is None or not path.is_file():
+        yield
+        return
+    with path.open("rb") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
 
 
 def digest_of(text: str) -> str:

@@ -25,6 +25,8 @@ KINDS = {
 """Long computations of the page with their names."""
 LAST_LINES = 12
 """Number of last lines of a command that the page shows."""
+REASONS = ("Bad input: ", "Failed: ")
+"""Beginnings of the message with which a command says why it fails."""
 PATIENCE = 10.0
 """Time (s) that a cancelled command has to store completed parts before it is killed."""
 
@@ -59,8 +61,15 @@ class LongTask:
             "digest": self.digest,
             "seconds": round(self.seconds if self.seconds is not None else time.monotonic() - self.began, 1),
             "progress": dict(self.progress),
+            "message": _reason(list(self.lines)) if state == "failed" else "",
             "lines": list(self.lines),
         }
+
+
+def _reason(lines: list[str]) -> str:
+    """Return the message of a command that failed; of one that says no reason its last line."""
+    starts = [number for number, line in enumerate(lines) if line.startswith(REASONS)]
+    return " ".join(lines[starts[-1] if starts else -1 :])
 
 
 class LongWork:

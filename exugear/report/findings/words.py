@@ -144,6 +144,10 @@ class Labels:
         return {body for coupling in self._gearbox.couplings for body in (coupling.first, coupling.second)}
 
     @cached_property
+    def _carried(self) -> set[str]:
+        return {body.name for body in self._gearbox.bodies() if body.carrier}
+
+    @cached_property
     def _meshes(self) -> set[str]:
         return {mesh.name for mesh in self._gearbox.meshes}
 
@@ -228,13 +232,13 @@ class Labels:
 
     def kinetic_energy(self, modes: xr.Dataset, index: int) -> dict[tuple[str, str], float]:
         """Return fractions of the kinetic energy by body label and motion; planets are summed."""
-        kinetic = modes["kinetic_energy_share"].to_numpy()[index]
-        carried = {body.name for body in self._gearbox.bodies() if body.carrier}
+        kinetic = modes["kinetic_energy_share"].to_numpy()[index].tolist()
+        motions = modes["motion"].to_numpy().tolist()
         shares: dict[tuple[str, str], float] = {}
-        for body, of_body in zip(modes["body"].to_numpy(), kinetic, strict=True):
-            name = "planets" if str(body) in carried else self.of(str(body))
-            for motion, share in zip(modes["motion"].to_numpy(), of_body, strict=True):
-                shares[name, str(motion)] = shares.get((name, str(motion)), 0.0) + float(share)
+        for body, of_body in zip(modes["body"].to_numpy().tolist(), kinetic, strict=True):
+            name = "planets" if body in self._carried else self.of(body)
+            for motion, share in zip(motions, of_body, strict=True):
+                shares[name, motion] = shares.get((name, motion), 0.0) + share
         return shares
 
     def moves(self, modes: xr.Dataset, index: int) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -51,6 +52,7 @@ class TriangleSurface:
         )
 
 
+@lru_cache(maxsize=32)
 def gear_surface(gear: Gear, angle: float = 0.0, rim_diameter: float | None = None) -> TriangleSurface:
     """Return the surface of a whole gear with its teeth, about the z axis, with z = 0 in the middle of the face width.
 
@@ -77,7 +79,10 @@ def gear_surface(gear: Gear, angle: float = 0.0, rim_diameter: float | None = No
     plain = np.stack([_circle(rim, polar + twist * part, gear.face_width * part) for part in heights[[0, -1]]])
     # Walls extend around the axis; end faces join the teeth with the rim at the same polar angles.
     bands = [toothed, plain[::-1], np.stack([plain[0], toothed[0]]), np.stack([toothed[-1], plain[1]])]
-    return TriangleSurface.joined([_band(band) for band in bands])
+    surface = TriangleSurface.joined([_band(band) for band in bands])
+    for values in (surface.points, surface.triangles):
+        values.flags.writeable = False  # a picture that is drawn again reads the same arrays
+    return surface
 
 
 def _gear_outline(gear: Gear) -> Floats:
@@ -326,10 +331,21 @@ def displacement_of(body: BodyShape, motion: ArrayLike) -> Floats:
 
 def _displaced(body: BodyShape, motion: Floats | Complexes) -> Floats | Complexes:
     """Return the displacement (n, 3) of each point for a real or complex motion (6,)."""
-    a, b, c = motion[3:]
+    displacement: Floats | Complexes = motion[:3] + turned(motion[3:], body.surface.points - body.reference)
+    return displacement
+
+
+def turned(rotation: Floats | Complexes, arms: Floats) -> Floats | Complexes:
+    """Return the displacements (n, 3) or (3,) at arms (n, 3) or (3,) for a small rotation (3,) about x, y, z.
+
+    Examples
+    --------
+    >>> turned(np.array([0.0, 0.0, 0.1]), np.array([2.0, 0.0, 0.0]))
+    array([0. , 0.2, 0. ])
+    """
+    a, b, c = rotation
     # The vector product with the rotations as a matrix: np.cross takes ten times as long for few points.
-    turning = np.array([[0.0, c, -b], [-c, 0.0, a], [b, -a, 0.0]])
-    displacement: Floats | Complexes = motion[:3] + (body.surface.points - body.reference) @ turning
+    displacement: Floats | Complexes = arms @ np.array([[0.0, c, -b], [-c, 0.0, a], [b, -a, 0.0]])
     return displacement
 
 
@@ -360,14 +376,13 @@ def largest_displacement(vibrations: Sequence[Complexes]) -> complex:
     Vibrations divided by it have the largest displacement 1 at the time 0. It is 0 if nothing moves, and real and
     positive for a mode shape, whose points all move in phase.
     """
-    largest = 0.0j
-    for vibration in vibrations:
-        sizes = peak_displacement(vibration)
-        point = int(np.argmax(sizes))
-        if sizes[point] > abs(largest):
-            phase = 0.5 * np.angle(np.sum(vibration[point] ** 2))
-            largest = complex(sizes[point] * np.exp(1j * phase))
-    return largest
+    if not vibrations:
+        return 0.0j
+    together = np.concatenate(vibrations)
+    sizes = peak_displacement(together)
+    point = int(np.argmax(sizes))
+    phase = 0.5 * np.angle(np.sum(together[point] ** 2))
+    return complex(sizes[point] * np.exp(1j * phase))
 
 
 def placed(body: BodyShape, motion: ArrayLike) -> Floats:

@@ -21,6 +21,7 @@ from exugear.report.pictures.shapes import (
     gear_surface,
     largest_displacement,
     motions_of,
+    turned,
     vibration_of,
 )
 from exugear.report.web.document import ArrayStore, rounded, rounded_list
@@ -132,6 +133,7 @@ def _moving(
 ) -> tuple[Floats, dict[int, Floats]]:
     """Return motions (bodies, 6) and fields of the bodies for real coordinates (size,)."""
     moving = motions_of(assembly.bodies, assembly.coordinates, assembly.rigid_part(shape))
+    centres = {own.name: np.array([*own.axis, own.centre_of_mass_z]) for own in assembly.bodies}
     motions = np.zeros((len(bodies), 6))
     fields: dict[int, Floats] = {}
     for place, body in enumerate(bodies):
@@ -142,16 +144,9 @@ def _moving(
             motions[place] = np.append(shape, 0.0)[list(seat)]
         else:
             motions[place] = moving.get(body.owner, np.zeros(6))
-            motions[place, :3] += np.cross(motions[place, 3:], body.shape.reference - _reference(assembly, body))
+            arm = body.shape.reference - centres.get(body.owner, body.shape.reference)
+            motions[place, :3] += np.asarray(turned(motions[place, 3:], arm), dtype=np.float64)
     return motions, fields
-
-
-def _reference(assembly: Assembly, body: DrawnBody) -> Floats:
-    """Return the reference point of the owner's rigid-body motion: its centre of mass."""
-    own = next((one for one in assembly.bodies if one.name == body.owner), None)
-    if own is None:
-        return body.shape.reference
-    return np.array([*own.axis, own.centre_of_mass_z])
 
 
 def turn_between(first: BodyShape, other: BodyShape) -> float | None:

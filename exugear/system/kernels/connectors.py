@@ -11,6 +11,7 @@ zeros.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -261,37 +262,58 @@ def rolling_pushes(q: Floats, connectors: ConnectorArrays) -> Floats:
     return out[..., : q.size]
 
 
-def add_connector_tangents(
-    q: Floats, steps: Floats, connectors: ConnectorArrays, stiffness: Floats, damping: Floats | None = None
-) -> None:
-    """Add minus the derivatives (size, size) of the connectors' forces to coordinates q and to velocities, at rest.
-
-    By central differences, because axes, arms and angles depend on the coordinates, too. A cage's torque is left out.
+def add_connector_stiffness(q: Floats, steps: Floats, connectors: ConnectorArrays, stiffness: Floats) -> None:
+    """Add minus the derivatives (size, size) of the connectors' forces to coordinates q, at rest.
 
     Parameters
     ----------
-    steps : (c,) of the differences, m or rad, and per second; connectors with 0 are left out
-    damping : None if the derivatives to velocities are not required
+    steps : (c,) as in `connector_tangents`
     """
-    numbers = np.flatnonzero(steps)
-    if not numbers.size:
+    if steps.size:
+        slopes = _slopes(q, steps, connectors, rates=False)
+        stiffness += _scattered(slopes, _places(connectors, q.size).reshape(-1, 2 * BODY_SIZE), q.size)
+
+
+def connector_tangents(q: Floats, steps: Floats, connectors: ConnectorArrays) -> Iterator[tuple[Floats, Floats]]:
+    """Yield stiffness and damping (size, size) of each connector at coordinates q at rest.
+
+    Minus the derivatives of its forces to coordinates and to velocities, by central differences, because axes, arms and
+    angles depend on the coordinates, too. A cage's torque is left out.
+
+    Parameters
+    ----------
+    steps : (c,) of the differences, m or rad, and per second
+    """
+    if not steps.size:
         return
-    chosen = connectors if numbers.size == steps.size else connectors.chosen(numbers)
+    both = [_slopes(q, steps, connectors, rates) for rates in (False, True)]
+    places = _places(connectors, q.size).reshape(-1, 2 * BODY_SIZE)
+    for n in range(len(steps)):
+        one = slice(n, n + 1)
+        stiffness, damping = (_scattered(slopes[one], places[one], q.size) for slopes in both)
+        yield stiffness, damping
+
+
+def _slopes(q: Floats, steps: Floats, connectors: ConnectorArrays, rates: bool) -> Floats:
+    """Minus the derivatives (c, 12, 12) of forces on both ends to their coordinates, or to the rates of these."""
     ends = 2 * BODY_SIZE
-    places = _places(chosen, q.size).reshape(-1, ends)
     # One coordinate of each connector at a time goes ahead and back: (coordinate, way, connector, end, coordinate).
-    ways = np.eye(ends)[:, None, None] * np.array([1.0, -1.0])[:, None, None] * steps[numbers, None]
+    ways = np.eye(ends)[:, None, None] * np.array([1.0, -1.0])[:, None, None] * steps[:, None]
     ways = ways.reshape(ends, 2, -1, 2, BODY_SIZE)
-    rest = _local(q, places).reshape(-1, 2, BODY_SIZE)
-    for total, (x, u) in ((stiffness, (rest + ways, 0.0 * ways)), (damping, (rest + 0.0 * ways, ways))):
-        if total is None:
-            continue
-        moved, load, _ = _loads(x, u, chosen)
-        forces = _forces(x, moved, load).reshape(ends, 2, -1, ends)
-        slopes = (forces[:, 1] - forces[:, 0]) / (2.0 * steps[numbers, None])
-        padded = np.zeros((q.size + BODY_SIZE,) * 2)
-        np.add.at(padded, (places[:, None, :], places[:, :, None]), slopes.transpose(1, 0, 2))
-        total += padded[: q.size, : q.size]
+    still = np.zeros_like(ways)
+    rest = _local(q, _places(connectors, q.size))
+    x, u = (rest + still, ways) if rates else (rest + ways, still)
+    moved, load, _ = _loads(x, u, connectors)
+    forces = _forces(x, moved, load).reshape(ends, 2, -1, ends)
+    slopes: Floats = (forces[:, 1] - forces[:, 0]) / (2.0 * steps[:, None])
+    return slopes.transpose(1, 2, 0)
+
+
+def _scattered(slopes: Floats, places: Integers, size: int) -> Floats:
+    """Sum (size, size) of the matrices (c, 12, 12) of connectors at their places (c, 12)."""
+    padded = np.zeros((size + BODY_SIZE,) * 2)
+    np.add.at(padded, (places[:, :, None], places[:, None, :]), slopes)
+    return padded[:size, :size]
 
 
 def no_connectors() -> ConnectorArrays:

@@ -15,10 +15,11 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.templates.kinds import KINDS, template
 from exugear.gearbox.variant import Variant
 from exugear.system.modes import modes_of
+from exugear.system.operating_points import bearing_duties
 from exugear.system.statics import static_state
 
 PAIR = template("pair")
-STEPS = ["check", "picture", "dynamics", "loads"]
+STEPS = ["check", "picture", "dynamics", "loads", "shapes"]
 
 
 def line_of(text: str, words: str) -> int:
@@ -99,7 +100,7 @@ def test_the_numbers_are_those_of_the_commands():
     steps = steps_of(PAIR)
     assembly = assembled_by_iso(Gearbox.from_dict(tomllib.loads(PAIR)), Variant.bushing)
     modes = modes_of(assembly)
-    rows = steps["dynamics"]["tables"]["modes"]["rows"]
+    rows = steps["shapes"]["tables"]["modes"]["rows"]
     assert [row["cells"][1] for row in rows] == [f"{modes.frequency[int(row['key'])]:.1f}" for row in rows]
     meshes = steps["loads"]["tables"]["meshes"]["rows"]
     assert meshes[0]["cells"][2] == f"{1e3 * static_state(assembly).misalignment[0]:.3f}"
@@ -109,6 +110,34 @@ def test_the_numbers_are_those_of_the_commands():
     diagram = steps["dynamics"]["campbell"]
     shown = [own for own in diagram["modes"] if own["frequency"] <= diagram["top"]]
     assert steps["dynamics"]["first"] == max(shown, key=lambda own: modes.overall[own["mode"]])["mode"]
+
+
+def test_results_do_not_depend_on_what_was_typed_before():
+    """The search for the static state begins at the last one: under ten times the load and on stiffer seats."""
+    before = template("parallel")
+    after = before.replace("input = 100.0", "input = 1000.0").replace("factor = 0.5", "factor = 0.9")
+    assert after != before
+    analyst = Analyst("parallel.toml")
+    list(analyst.steps(before))
+    later = {step["step"]: step for step in analyst.steps(after)}
+    fresh = {step["step"]: step for step in Analyst("parallel.toml").steps(after)}
+    for step in ("check", "loads", "shapes"):
+        assert later[step]["tables"] == fresh[step]["tables"]
+    found, expected = ([own["frequency"] for own in steps["dynamics"]["campbell"]["modes"]] for steps in (later, fresh))
+    assert found == pytest.approx(expected, rel=2e-6)  # six digits are sent
+
+
+def test_one_bearing_of_a_planet_set_stands_for_all_and_is_that_of_the_commands():
+    text = template("planetary")
+    duties = bearing_duties(assembled_by_iso(Gearbox.from_dict(tomllib.loads(text)), Variant.bushing))
+    rows = steps_of(text)["loads"]["tables"]["bearings"]["rows"]
+    firsts = {duty.family: duty for duty in reversed(duties)}
+    assert len(firsts) < len(duties)
+    assert {row["key"] for row in rows} == {f"bearings.{family}" for family in firsts}
+    for row in rows:
+        duty = firsts[row["key"].removeprefix("bearings.")]
+        assert row["cells"][0] == duty.name
+        assert float(row["cells"][1]) == pytest.approx(1e-3 * duty.radial_load, rel=6e-3)
 
 
 def test_parts_of_planets_are_selected_together():
@@ -155,7 +184,7 @@ def test_a_gearbox_without_bearings_says_what_is_missing():
     steps = steps_of(cut)
     assert "bearing" in steps["loads"]["unavailable"]
     assert steps["loads"]["tables"]["bearings"]["rows"] == steps["loads"]["tables"]["meshes"]["rows"] == []
-    assert steps["dynamics"]["tables"]["modes"]["rows"]
+    assert steps["shapes"]["tables"]["modes"]["rows"]
 
 
 @pytest.mark.parametrize("text", ["", "\x00", "a = 1", "[" * 5000, f"a = {'9' * 9999}", "name = 1\n" * 3, "\ud800"])

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import http.client
 import json
+import re
+import signal
 import socket
+import subprocess
+import sys
 import threading
+import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -184,6 +190,67 @@ def test_saving_needs_the_content_that_the_page_knows(server):
     assert ask(server, own(server, "save"), {"text": text, "digest": digest_of(PAIR)})[0] == 200
     assert server.file.case.read_text(encoding="utf-8") == text
     assert [path.name for path in server.file.case.parent.iterdir()] == ["pair.toml"]
+
+
+def test_of_several_that_save_at_once_one_succeeds_and_the_others_are_told(tmp_path):
+    """Two servers with four tabs each: what the first has saved is never replaced unseen."""
+    case = tmp_path / "pair.toml"
+    case.write_text(PAIR, encoding="utf-8")
+    servers = [EditedFile(case, tmp_path / "results") for _ in range(2)]
+    begin = threading.Barrier(8)
+
+    def save(number: int) -> bool:
+        begin.wait()
+        try:
+            servers[number % 2].save(f"{PAIR}# {number}\n", digest_of(PAIR))
+        except FileConflictError:
+            return False
+        return True
+
+    with ThreadPoolExecutor(8) as pool:
+        saved = list(pool.map(save, range(8)))
+    assert saved.count(True) == 1
+    assert case.read_text(encoding="utf-8") == f"{PAIR}# {saved.index(True)}\n"
+
+
+@pytest.mark.validation
+@pytest.mark.usefixtures("terminal_signals")
+def test_ctrl_c_while_saving_leaves_one_whole_text_and_no_other_file(tmp_path):
+    case = tmp_path / "pair.toml"
+    case.write_text(PAIR, encoding="utf-8")
+    command = [sys.executable, "-P", "-c", "from exugear.cli.app import main; main()", "edit", str(case)]
+    with subprocess.Popen([*command, "--no-browser"], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        port, token = re.search(r":(\d+)/([\w-]+)/", process.stdout.readline()).groups()
+        texts = [PAIR]
+        with suppress(OSError, http.client.HTTPException):
+            while True:
+                texts.append(f"{PAIR}# {len(texts)}\n")
+                connection = http.client.HTTPConnection("127.0.0.1", int(port), timeout=60)
+                content = json.dumps({"text": texts[-1], "digest": digest_of(texts[-2])})
+                connection.request("POST", f"/{token}/save", content, JSON)
+                assert connection.getresponse().status == 200
+                connection.close()
+                if len(texts) == 20:
+                    process.send_signal(signal.SIGINT)
+        assert process.wait(60) == 130
+    assert len(texts) > 20 or case.read_text(encoding="utf-8") == texts[-1]
+    assert case.read_text(encoding="utf-8") in texts[-2:]
+    assert [path.name for path in tmp_path.iterdir()] == ["pair.toml"]
+
+
+@pytest.mark.validation
+def test_work_that_fails_shows_the_message_of_the_command(server, capsys):
+    (server.file.folder).write_text("no folder")
+    server.work.start("tables", digest_of(PAIR))
+    while server.work.running:
+        time.sleep(0.05)
+    told = server.work.told()
+    with pytest.raises(SystemExit) as end:
+        app(server.work.commands("tables")[0])
+    assert (told["state"], end.value.code) == ("failed", 2)
+    assert told["message"] == capsys.readouterr().err.strip()
+    assert told["message"].startswith("Bad input: ")
 
 
 def test_work_of_an_unknown_kind_or_of_a_file_with_errors_is_refused(server):

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from exugear.cli.edit.stored import EditedFile, digest_of
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.templates.kinds import template
 from exugear.results.folder import REPORT_FILE, keep_case, note_time
@@ -78,8 +79,10 @@ class EditView:
 
 
 @pytest.fixture(scope="module")
-def served(tmp_path_factory: pytest.TempPathFactory, terminal_signals_of_module: None) -> Iterator[tuple[Path, str]]:
-    """File and address of one server for all tests, since its start takes longer than most of them."""
+def served(
+    tmp_path_factory: pytest.TempPathFactory, terminal_signals_of_module: None
+) -> Iterator[tuple[Path, str, subprocess.Popen[str]]]:
+    """File, address and process of one server for all tests, since its start takes longer than most of them."""
     pytest.importorskip("playwright", reason="no playwright: pip install playwright")
     path = tmp_path_factory.mktemp("edit") / "pair.toml"
     path.write_text(PAIR, encoding="utf-8")
@@ -91,13 +94,13 @@ def served(tmp_path_factory: pytest.TempPathFactory, terminal_signals_of_module:
         assert server.stdout is not None
         found = re.search(r"http://127\.0\.0\.1:\d+/[\w-]+/", server.stdout.readline())
         assert found
-        yield path, found[0]
+        yield path, found[0], server
         server.send_signal(signal.SIGINT)
         assert server.wait(60) == 130
 
 
 @pytest.fixture
-def case(served: tuple[Path, str]) -> Path:
+def case(served: tuple[Path, str, Any]) -> Path:
     """The file as it was before the first test, without results."""
     path = served[0]
     path.write_text(PAIR, encoding="utf-8")
@@ -106,16 +109,27 @@ def case(served: tuple[Path, str]) -> Path:
 
 
 @pytest.fixture
-def address(served: tuple[Path, str], case: Path) -> str:
+def address(served: tuple[Path, str, Any], case: Path) -> str:
     return served[1]
 
 
 @pytest.fixture
-def view(browser: Any, address: str) -> Iterator[EditView]:
+def process(served: tuple[Path, str, subprocess.Popen[str]]) -> subprocess.Popen[str]:
+    return served[2]
+
+
+@pytest.fixture
+def early_view(browser: Any, address: str) -> Iterator[EditView]:
+    """A page whose results are still being computed."""
     one = EditView(browser, address)
-    one.current()
     yield one
     one.page.context.close()
+
+
+@pytest.fixture
+def view(early_view: EditView) -> EditView:
+    early_view.current()
+    return early_view
 
 
 def test_an_error_is_shown_at_its_line_and_its_correction_is_taken(view: EditView) -> None:
@@ -274,11 +288,70 @@ def test_two_tabs_and_another_editor_do_no_harm(view: EditView, browser: Any, ad
     case.write_text(PAIR.replace("modal_percent = 2.0", "modal_percent = 1.0"), encoding="utf-8")
     view.page.wait_for_selector(".cm-line >> text=modal_percent = 1.0")
     other.page.wait_for_selector("#conflict:visible")
+    number = PAIR.split("\n").index("modal_percent = 2.0") + 1
+    assert f"They differ in line {number}." in other.text("#conflict-words")
     other.page.click("#keep-text")
+    # The other text is not lost: it is one step of undo away.
+    other.page.click("#undo")
+    other.page.wait_for_selector(".cm-line >> text=modal_percent = 1.0")
+    other.page.click("#redo")
+    other.page.wait_for_selector(".cm-line >> text=modal_percent = 3.5")
     other.page.click("#save")
     view.page.wait_for_selector(".cm-line >> text=modal_percent = 3.5")
     assert "modal_percent = 3.5" in case.read_text(encoding="utf-8")
     other.page.context.close()
+
+
+def test_the_page_cannot_replace_what_another_server_has_saved(early_view: EditView, case: Path) -> None:
+    view = early_view
+    view.type_over("modal_percent = 2.0", 3, "2.5")
+    EditedFile(case, case.parent / "results").save(PAIR.replace("= 2.0", "= 3.5"), digest_of(PAIR))
+    view.page.click("#save")
+    view.page.wait_for_selector("#conflict:visible")
+    assert "modal_percent = 3.5" in case.read_text(encoding="utf-8")
+    view.page.click("#take-file")
+    view.page.wait_for_selector(".cm-line >> text=modal_percent = 3.5")
+    assert view.text("#saved") == "saved"
+    view.page.click("#undo")
+    view.page.wait_for_selector(".cm-line >> text=modal_percent = 2.5")
+    assert view.text("#saved") == "not saved"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits the files of another process")
+def test_on_a_full_disk_the_file_keeps_its_content_and_the_page_says_so(
+    early_view: EditView, case: Path, process: subprocess.Popen[str]
+) -> None:
+    """A file may not grow beyond a limit: as on a full disk, some of it can be written and the rest cannot."""
+    import resource
+
+    view = early_view
+    view.type_over("modal_percent = 2.0", 3, "2.5")
+    unlimited = resource.prlimit(process.pid, resource.RLIMIT_FSIZE)
+    resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (1000, unlimited[1]))
+    try:
+        view.page.click("#save")
+        view.page.wait_for_selector("#not-saved:visible")
+    finally:
+        resource.prlimit(process.pid, resource.RLIMIT_FSIZE, unlimited)
+    told = view.text("#not-saved")
+    assert told.startswith("The file was not saved and has its earlier content")
+    assert "File too large" in told
+    assert case.read_text(encoding="utf-8") == PAIR
+    assert not list(case.parent.glob(".*"))
+    assert view.text("#saved") == "not saved"
+    view.page.click("#save")
+    assert view.soon(lambda: view.text("#saved") == "saved")
+    assert not view.page.locator("#not-saved").is_visible()
+
+
+def test_work_that_fails_says_why(early_view: EditView, case: Path) -> None:
+    view = early_view
+    (case.parent / "results").write_text("no folder")
+    view.page.get_by_role("button", name="Tables").click()
+    assert view.soon(lambda: view.text("#work-words").startswith("Tables: failed after"))
+    assert re.search(r"s\. Bad input: .*results: .*; specify a folder", view.text("#work-words"))
+    (case.parent / "results").unlink()
+    assert view.errors == []
 
 
 def test_on_a_phone_text_and_results_take_turns(browser: Any, address: str) -> None:

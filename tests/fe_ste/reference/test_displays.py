@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import base64
 import dataclasses
+import io
 import re
 from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from matplotlib import image
 
 import fe_ste
 from fe_ste.elasticity.hexmesh import sector_mesh
 from fe_ste.reference.position import stress_of_position
 from fe_ste.reference.table import NonlinearInput, NonlinearTable
+from fe_ste.tools.drawing import inline_picture
 from fe_ste.transmission_error.search import contact_state
 from fe_ste.transmission_error.states import StateAxes, StateResults
 
@@ -110,6 +114,21 @@ def test_a_notebook_shows_small_tables_and_runs_no_name(shown):
         page.feed(table)
         assert page.elements == {"table", "caption", "tr", "th", "td"}, name
         assert len(table) < 2000, name
+
+
+def test_a_mesh_table_shows_its_transmission_error_as_a_picture():
+    """The picture is drawn: its pixels are not those of the same axes without curves."""
+    coarse = fe_ste.MeshSettings(layers=3, flank=4, thickness=4)
+    table = fe_ste.MeshTable.compute(fe_ste.TableInput(pair=PAIR, torque=(100.0,), positions=4, mesh=coarse))
+    (encoded,) = re.findall('src="data:image/png;base64,([^"]+)"', table._repr_html_())
+    pixels = image.imread(io.BytesIO(base64.b64decode(encoded)))
+    axes = table.plot()
+    for line in axes.lines:
+        line.set_visible(False)
+    (encoded,) = re.findall('base64,([^"]+)"', inline_picture(axes.figure, "MeshTable"))
+    empty = image.imread(io.BytesIO(base64.b64decode(encoded)))
+    assert pixels.shape == empty.shape
+    assert (pixels != empty).any()
 
 
 def test_a_hostile_name_is_shown_as_it_is(shown):

@@ -1,6 +1,6 @@
 // The page of the command `edit`: the text, and all that the program makes of it.
 import { find, make, need, say } from "./dom.js";
-import { keyAt, pointOut, setOld, showCampbell, showCheck, showDynamics, showLoads, showPicture, shown, shownGeometry, stepMode, tellVerdict } from "./edit_results.js";
+import { keyAt, pointOut, setOld, showCampbell, showCheck, showDynamics, showLoads, showPicture, showShapes, shown, shownGeometry, stepMode, tellVerdict } from "./edit_results.js";
 import { ask, results } from "./edit_server.js";
 import { beginSlider, followCursor } from "./edit_slider.js";
 import { correct, correctionText, goToKey, goToLine, keyAtCursor, makeEditor, putText, showRemarks } from "./edit_text.js";
@@ -20,7 +20,7 @@ let timer = 0;
 /** Number of the text: results of an earlier one are shown grey. */
 let version = 0;
 /** Results that come one after the other. */
-const STEPS = ["check", "picture", "dynamics", "loads"];
+const STEPS = ["check", "picture", "dynamics", "loads", "shapes"];
 
 const editor = makeEditor(need("text"), { changed: onText, moved: onCursor, save: () => void save() });
 const text = () => editor.state.doc.toString();
@@ -59,8 +59,9 @@ async function compute() {
       for await (const step of results(text(), shownGeometry())) {
         if (step.step === "check") showCheck(step, goTo);
         if (step.step === "picture") await showPicture(step);
-        if (step.step === "dynamics") await showDynamics(step);
+        if (step.step === "dynamics") showDynamics(step);
         if (step.step === "loads") showLoads(step, goTo);
+        if (step.step === "shapes") await showShapes(step);
         if (mine === version) tell(step);
         else setOld(STEPS, true);
         if (again && step.step === "dynamics") break;
@@ -104,14 +105,21 @@ function remarkItem(remark) {
 
 async function save() {
   const saved = text();
-  const response = await ask("save", { text: saved, digest: file.digest });
-  const content = await response.json();
-  if (response.ok) {
-    Object.assign(file, { text: saved, digest: content.digest });
-    onTextState();
-    say("Saved");
-  } else if (response.status === 409) offer(content.file.digest);
-  else say(content.error);
+  const failure = need("not-saved");
+  try {
+    const response = await ask("save", { text: saved, digest: file.digest });
+    const content = await response.json();
+    failure.hidden = response.ok || response.status === 409;
+    if (response.ok) {
+      Object.assign(file, { text: saved, digest: content.digest });
+      onTextState();
+      say("Saved");
+    } else if (response.status === 409) await offer(content.file.digest);
+    else failure.textContent = content.error;
+  } catch {
+    failure.textContent = "The file was not saved: the server does not answer.";
+    failure.hidden = false;
+  }
 }
 
 function onTextState() {
@@ -124,13 +132,37 @@ function onTextState() {
 function noticeFile(told) {
   if (told.digest === file.digest || told.missing) return;
   if (isSaved()) void load("The file was changed by another program and read again");
-  else if (file.offered !== told.digest) offer(told.digest);
+  else if (file.offered !== told.digest) void offer(told.digest);
 }
 
 /** Let the user choose between the text and the file. @param {string} digest of the file */
-function offer(digest) {
+async function offer(digest) {
   file.offered = digest;
+  const { text: other } = await (await ask("file")).json();
+  need("conflict-words").textContent = `The file was changed by another program or page, and this text is not saved. They differ ${placeOfDifference(text(), other)}.`;
   need("conflict").hidden = false;
+}
+
+/** @param {string} mine @param {string} other @returns {string} lines of the first text between its first and last difference from the other */
+function placeOfDifference(mine, other) {
+  const [a, b] = [mine.split("\n"), other.split("\n")];
+  let first = 0;
+  while (first < Math.min(a.length, b.length) && a[first] === b[first]) first++;
+  let last = 0;
+  while (last < Math.min(a.length, b.length) - first && a[a.length - 1 - last] === b[b.length - 1 - last]) last++;
+  const end = Math.max(a.length - last, first + 1);
+  return end === first + 1 ? `in line ${end}` : `between lines ${first + 1} and ${end}`;
+}
+
+/** Go on with the text; the file is one step of undo away. */
+async function keepText() {
+  const mine = text();
+  const content = await (await ask("file")).json();
+  Object.assign(file, { text: content.text, digest: content.digest });
+  need("conflict").hidden = true;
+  putText(editor, content.text);
+  putText(editor, mine);
+  onTextState();
 }
 
 /** @param {string} words */
@@ -173,7 +205,7 @@ function beginPicking() {
 
 async function begin() {
   beginModeView();
-  need("mode-title").dataset.step = "dynamics";
+  need("mode-title").dataset.step = "shapes";
   beginPicking();
   beginSlider(editor);
   beginTheme(() => (showCampbell(), void drawMode()));
@@ -183,10 +215,7 @@ async function begin() {
   need("before").addEventListener("click", () => stepMode(-1));
   need("next").addEventListener("click", () => stepMode(1));
   need("take-file").addEventListener("click", () => void load(""));
-  need("keep-text").addEventListener("click", () => {
-    file.digest = file.offered;
-    need("conflict").hidden = true;
-  });
+  need("keep-text").addEventListener("click", () => void keepText());
   for (const button of document.querySelectorAll("#sides button")) {
     button.addEventListener("click", () => showSide(/** @type {HTMLElement} */ (button).dataset.side ?? ""));
   }

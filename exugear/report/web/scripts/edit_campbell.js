@@ -56,7 +56,7 @@ export function drawCampbell(figure, data, chosen, choose) {
   const words = /** @type {HTMLElement} */ (figure.querySelector(".words"));
   words.textContent = `${data.modes.length} modes with a share in the overall transmission error, up to ${figureText(data.top)} Hz.`;
   figure.querySelector(".legend")?.remove();
-  words.before(legendOf(families));
+  words.before(legendOf(families, data.range !== null));
 }
 
 /** @param {Plot} plot @param {Campbell} data @param {number} chosen */
@@ -119,14 +119,14 @@ function chooseByClick(plot, data, choose) {
   });
 }
 
-/** @param {string[]} families */
-function legendOf(families) {
+/** @param {string[]} families @param {boolean} range whether there is an operating range */
+function legendOf(families, range) {
   const legend = make("p", { class: "legend" });
   families.forEach((family, number) => {
     const sign = make("i", { class: "sign" });
     sign.style.borderColor = curveColour(number);
     legend.append(make("span", {}, sign, family.replaceAll("_", " ")));
   });
-  legend.append(make("span", {}, "dashed: 2nd and 3rd harmonic; points: share in the transmission error"));
+  legend.append(make("span", {}, `Dashed and dotted lines are the 2nd and 3rd harmonics. Points grow with the share of a mode in the transmission error.${range ? " The operating range is shaded." : ""}`));
   return legend;
 }

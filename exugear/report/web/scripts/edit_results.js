@@ -13,8 +13,8 @@ const MODEL = "live";
 /** Bodies drawn in the colour of selection, and rings, are for these tables of the file. */
 const PICKED = ["gears", "bearings", "bodies"];
 
-/** @type {{parts: PartData[], remarks: Remark[], campbell: import("./edit_campbell.js").Campbell | null}} */
-export const shown = { parts: [], remarks: [], campbell: null };
+/** @type {{parts: PartData[], remarks: Remark[], campbell: import("./edit_campbell.js").Campbell | null, first: number}} */
+export const shown = { parts: [], remarks: [], campbell: null, first: -1 };
 
 /** Bodies of the picture. @type {import("./page_data.js").StageData | undefined} */
 let bodies;
@@ -76,29 +76,35 @@ export async function showPicture(step) {
 }
 
 /** @param {any} step */
-export async function showDynamics(step) {
+export function showDynamics(step) {
   shown.remarks = [...shown.remarks, ...step.remarks];
   if (step.failed) return;
+  need("model").textContent = `Model: ${step.model}.`;
+  shown.campbell = step.campbell;
+  shown.first = step.first;
+  showCampbell();
+  setOld(["dynamics"], false);
+}
+
+/** @param {any} step */
+export async function showShapes(step) {
   addArrays(step.arrays);
   fillTable("modes", step.tables.modes, (key) => chooseMode(Number(key)));
-  need("model").textContent = `Model: ${step.model}.`;
-  const table = step.tables.modes.rows;
-  const count = Math.max(...table.map((/** @type {{key: string}} */ row) => Number(row.key) + 1), 0);
   /** @type {import("./page_data.js").ModeData[]} */
-  const modes = Array.from({ length: count }, () => ({ frequency: 0, damping: 0, words: "" }));
-  for (const { key, cells } of table) {
+  const modes = [];
+  for (const { key, cells } of step.tables.modes.rows) {
     const title = `Mode ${cells[0]} at ${cells[1]} Hz: ${cells[3]}`;
     modes[Number(key)] = { frequency: Number(cells[1]), damping: 0, words: cells[3], title };
   }
-  const before = pageData.models[MODEL];
   pageData.models[MODEL] = { words: "", variant: "", stage: { ...bodies, ...step.stage }, modes };
-  shown.campbell = step.campbell;
-  const mode = before && state.mode >= 0 && state.mode < count ? state.mode : step.first;
-  if (!before) choose({ model: MODEL, mode });
-  else choose({ model: MODEL, mode });
-  showCampbell();
+  // A mode that was chosen stays, by its number.
+  if (!modes[state.mode]) {
+    choose({ model: MODEL, mode: shown.first });
+    showCampbell();
+  }
+  markChosenMode();
   await drawMode();
-  setOld(["dynamics"], false);
+  setOld(["shapes"], false);
 }
 
 /** Name of the bodies that the page has. */
@@ -112,8 +118,12 @@ export function chooseMode(mode) {
 }
 
 export function showCampbell() {
-  need("mode-number").textContent = `Mode ${state.mode + 1}`;
+  need("mode-number").textContent = state.mode < 0 ? "" : `Mode ${state.mode + 1}`;
   if (shown.campbell) drawCampbell(need("campbell"), shown.campbell, state.mode, chooseMode);
+  markChosenMode();
+}
+
+function markChosenMode() {
   for (const row of document.querySelectorAll("#table-modes tbody tr")) {
     row.classList.toggle("chosen", row instanceof HTMLElement && row.dataset.key === String(state.mode));
   }

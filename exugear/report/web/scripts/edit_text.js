@@ -8,6 +8,18 @@ const HEADER = /^\s*\[\[?\s*([^\]#]+?)\s*\]/;
 const PAIR = /^\s*([\w."'-]+(?:\s*\.\s*[\w."'-]+)*)\s*=/;
 const NUMBER = /(?<![\w."'])[-+]?\d[\d_]*(?:\.\d+)?(?:[eE][-+]?\d+)?(?![\w."'])/g;
 
+/** Beginning of a number with an exponent, of which the mode of CodeMirror takes the part before it. */
+const EXPONENT = /^[-+]?\d[\d_]*(?:\.\d[\d_]*)?[eE][-+]?\d+/;
+
+/** The mode of CodeMirror, with whole numbers. */
+const tomlMode = () => ({
+  ...CM.toml,
+  token: (/** @type {any} */ stream, /** @type {any} */ state) => {
+    if (!state.inString && !state.lhs && stream.match(EXPONENT)) return "number";
+    return CM.toml.token(stream, state);
+  },
+});
+
 /** @param {string} dotted */
 const plainKey = (dotted) => dotted.replace(/["'\s]/g, "");
 
@@ -58,7 +70,7 @@ export function makeEditor(parent, told) {
     CM.closeBrackets(),
     CM.highlightSelectionMatches(),
     CM.search({ top: true }),
-    CM.StreamLanguage.define(CM.toml),
+    CM.StreamLanguage.define(tomlMode()),
     CM.syntaxHighlighting(COLOURS()),
     CM.autocompletion({ override: [completions], icons: false }),
     CM.keymap.of([
@@ -81,13 +93,18 @@ export function makeEditor(parent, told) {
   return new EditorView({ parent, state: CM.EditorState.create({ doc: "", extensions }) });
 }
 
-/** Replace the whole text, which can be undone unless it is the first. @param {Editor} editor @param {string} text @param {boolean} first */
+/** Replace the text where it differs, which can be undone unless it is the first; the cursor stays. @param {Editor} editor @param {string} text @param {boolean} first */
 export function putText(editor, text, first = false) {
-  const before = editor.state.selection.main.head;
+  const before = editor.state.doc.toString();
+  const least = Math.min(before.length, text.length);
+  let from = 0;
+  while (from < least && before[from] === text[from]) from++;
+  let same = 0;
+  while (same < least - from && before[before.length - 1 - same] === text[text.length - 1 - same]) same++;
   editor.dispatch({
-    changes: { from: 0, to: editor.state.doc.length, insert: text },
-    selection: { anchor: Math.min(before, text.length) },
+    changes: { from, to: before.length - same, insert: text.slice(from, text.length - same) },
     annotations: CM.Transaction.addToHistory.of(!first),
+    userEvent: "input.replace", // a step of its own for undo
   });
 }
 

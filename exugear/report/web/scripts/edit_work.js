@@ -2,7 +2,7 @@
 import { make, need, say } from "./dom.js";
 import { ask } from "./edit_server.js";
 
-/** @typedef {{kind: string, name: string, state: string, digest: string, seconds: number, progress: {words?: string, done?: number, total?: number | null, left?: number | null}, lines: string[]}} Told */
+/** @typedef {{kind: string, name: string, state: string, digest: string, seconds: number, message: string, progress: {words?: string, done?: number, total?: number | null, left?: number | null}, lines: string[]}} Told */
 /** @typedef {{digest: string, missing: boolean, results: Record<string, string>}} FileState */
 
 const PERIOD = 1000;
@@ -51,8 +51,8 @@ function showWork(work, digest) {
   const earlier = !running && work.digest !== digest;
   need("work").classList.toggle("old", earlier);
   const { words = "", done = 0, total = null, left = null } = work.progress;
-  const told = running ? [work.lines.at(-1), words, timeText(work.seconds), left === null ? "" : `${timeText(left)} left`] : [`${work.state} after ${timeText(work.seconds)}`];
-  need("work-words").textContent = `${work.name}: ${told.filter(Boolean).join(", ")}${earlier ? "; for an earlier state of the file" : ""}`;
+  const told = running ? [work.lines.at(-1), words, clockText(work.seconds), left ? `${clockText(Math.ceil(left))} left` : ""] : [`${work.state} after ${timeText(work.seconds)}`];
+  need("work-words").textContent = `${work.name}: ${told.filter(Boolean).join(", ")}${earlier ? "; for an earlier state of the file" : ""}${work.message && `. ${work.message}`}`;
   const bar = /** @type {HTMLProgressElement} */ (need("progress"));
   bar.hidden = !running;
   if (total) Object.assign(bar, { max: total, value: done });
@@ -78,6 +78,13 @@ function showStored(results, saved) {
   need("stored-results").replaceChildren(...items);
   const state = results.report && (saved ? results.report : "old");
   need("report").replaceChildren(...(state ? [make("a", { href: "report.html", target: "_blank", class: state }, REPORT_STATES[state])] : []));
+}
+
+/** Time as the command line shows it. @param {number} seconds */
+function clockText(seconds) {
+  const whole = Math.floor(seconds);
+  const two = (/** @type {number} */ number) => String(number % 60).padStart(2, "0");
+  return `${Math.floor(whole / 3600)}:${two(Math.floor(whole / 60))}:${two(whole)}`;
 }
 
 /** @param {number} seconds */

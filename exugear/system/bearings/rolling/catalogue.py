@@ -17,7 +17,7 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -82,6 +82,12 @@ def catalogue_rows(section: CatalogueSection) -> tuple[RollingRow, ...]:
     >>> [(row.element_count, round(math.degrees(row.contact_angle))) for row in catalogue_rows(section)]
     [(14, -13), (14, 13)]
     """
+    return _rows_of(section, frozenset(section.model_fields_set))
+
+
+@lru_cache(maxsize=128)
+def _rows_of(section: CatalogueSection, stated: frozenset[str]) -> tuple[RollingRow, ...]:
+    """Rows of a section; equal sections differ by the keys that the file states, which are no estimates."""
     full = _completed(section)
     row = _ball_row(full) if full.type.endswith("ball") else _roller_row(full)
     return *_placed(full, row), *_ribs(full, row)

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -91,13 +91,19 @@ def _row_laminae(row: RollerRow, first: int, first_roller_angle: float) -> Lamin
     along = np.tile(slices, row.element_count) * row.effective_length
     cosine = math.cos(row.contact_angle)
     sine = math.sin(row.contact_angle)
-    normal = np.column_stack([cosine * np.cos(polar), cosine * np.sin(polar), np.full(polar.size, sine)])
+    across, upwards = np.cos(polar), np.sin(polar)
+    normal = np.array([cosine * across, cosine * upwards, np.full(polar.size, sine)])
     radius = 0.5 * row.pitch_diameter - along * sine
-    point = np.column_stack([radius * np.cos(polar), radius * np.sin(polar), row.axial_position + along * cosine])
-    if row.aligning:
-        point[:] = 0.0, 0.0, row.sphere_centre  # contact forces pass through the centre of the raceway's sphere
+    point = np.array([radius * across, radius * upwards, row.axial_position + along * cosine])
+    if row.aligning:  # contact forces pass through the centre of the raceway's sphere
+        point[:] = np.array([0.0, 0.0, row.sphere_centre])[:, None]
+    direction = np.empty((polar.size, 6))
+    direction[:, :3] = normal.T
+    direction[:, 3] = point[1] * normal[2] - point[2] * normal[1]
+    direction[:, 4] = point[2] * normal[0] - point[0] * normal[2]
+    direction[:, 5] = point[0] * normal[1] - point[1] * normal[0]
     return LaminaArrays(
-        direction=np.hstack([normal, np.cross(point, normal)]),
+        direction=direction,
         gap=0.5 * row.radial_clearance * cosine + 2.0 * row.drop(along),
         constant=np.full(polar.size, row.contact_constant / row.laminae),
         pressure=np.full(polar.size, _lamina_pressure(row)),
@@ -263,18 +269,24 @@ class BearingState(ReprMixin):
     """(6,) inner ring relative to outer ring, m and rad."""
     load: Floats
     """(6,) force and moment on the inner ring that hold it there, N and N m."""
-    tangent: Floats
-    """(6, 6) derivative of the load, N/m, N, N m/rad."""
     element_load: Floats
     """(elements,) load of each roller or ball, row by row, N."""
     element_pressure: Floats
     """(elements,) maximum pressure of each on a raceway, Pa."""
     lamina_load: tuple[Floats | None, ...]
     """(elements, laminae) for each row of rollers the load of each lamina, N; None for a row of balls."""
-    energy: float
-    """Elastic energy, J."""
     contacts: RowContacts
     """The contacts, for further evaluation."""
+
+    @cached_property
+    def tangent(self) -> Floats:
+        """Derivative (6, 6) of the load, N/m, N, N m/rad."""
+        return tangent_stiffness(self.contacts, self.displacement)
+
+    @property
+    def energy(self) -> float:
+        """Elastic energy, J."""
+        return elastic_energy(self.contacts, self.displacement)
 
     def _line(self) -> str:
         displacement, load = (
@@ -292,15 +304,13 @@ class BearingState(ReprMixin):
 
 
 def bearing_state(contacts: RowContacts, displacement: Floats) -> BearingState:
-    """Evaluate loads, pressures and tangent of a bearing at a displacement of the inner ring, shape (6,)."""
+    """Evaluate loads and pressures of a bearing at a displacement of the inner ring, shape (6,)."""
     return BearingState(
         displacement=displacement,
         load=bearing_load(contacts, displacement),
-        tangent=tangent_stiffness(contacts, displacement),
         element_load=element_loads(contacts, displacement),
         element_pressure=element_pressures(contacts, displacement),
         lamina_load=loads_of_laminae(contacts, displacement),
-        energy=elastic_energy(contacts, displacement),
         contacts=contacts,
     )
 

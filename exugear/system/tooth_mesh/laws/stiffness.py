@@ -195,7 +195,8 @@ def _pack_friction(parts: Sequence[Floats]) -> Floats:
     """Fill `MeshArrays.friction` from the parts (3, n) of each mesh."""
     coefficients = np.zeros((len(parts), max((own.shape[1] for own in parts), default=0), 4 * FRICTION_PARTS))
     for block, own in zip(coefficients, parts, strict=True):
-        block[: own.shape[1]] = np.hstack([periodic_cubic(part) for part in own])
+        if own.size:
+            block[: own.shape[1]] = np.hstack([periodic_cubic(part) for part in own])
     return coefficients
 
 

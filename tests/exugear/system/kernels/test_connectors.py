@@ -14,9 +14,10 @@ from exugear.system.bearings.rolling.point_contact import rolling_arrays
 from exugear.system.kernels.connectors import (
     ConnectorArrays,
     add_connector_forces,
-    add_connector_tangents,
+    add_connector_stiffness,
     connector_loads,
     connector_strains,
+    connector_tangents,
 )
 from exugear.system.kernels.rolling import no_rolling
 
@@ -76,8 +77,11 @@ def test_tangents_are_the_derivatives_of_the_forces_of_chosen_connectors(connect
     """Central differences of the same length: of the whole law against those of each connector's own coordinates."""
     q, _ = state(2)
     chosen, step = np.array([0.0, 1.0, 1.0, 0.0, 1.0]), 1e-6
-    stiffness, damping = np.zeros((SIZE, SIZE)), np.zeros((SIZE, SIZE))
-    add_connector_tangents(q, step * chosen, connectors, stiffness, damping)
+    tangents = np.array(list(connector_tangents(q, np.full(len(ENDS), step), connectors)))
+    whole = np.zeros((SIZE, SIZE))
+    add_connector_stiffness(q, np.full(len(ENDS), step), connectors, whole)
+    assert np.abs(whole - tangents[:, 0].sum(axis=0)).max() < 1e-12 * np.abs(whole).max()
+    stiffness, damping = tangents[chosen > 0.0].sum(axis=0)
     few = connectors.chosen(np.flatnonzero(chosen))
     few = few._replace(rolling=few.rolling._replace(cage_ratio=np.zeros(3)))  # whose torque tangents leave out
     if few.rolling.first[-1]:  # the cage stands where it would have stood
