@@ -354,6 +354,7 @@ class Project(ReprMixin):
             The response has no signal at the place of a channel.
         """
         from exugear.steady.evaluation.damping import damping_extremes
+        from exugear.steady.evaluation.load_over_speed import LoadedModels
         from exugear.steady.evaluation.measured_comparison import compare_run_up
         from exugear.steady.evaluation.run_up import MeasuredRunUp, read_run_up, response_settings
         from exugear.steady.steady_file import stored_or_computed
@@ -361,12 +362,18 @@ class Project(ReprMixin):
         found = run_up if isinstance(run_up, MeasuredRunUp) else read_run_up(self.gearbox, run_up)
         loaded = self.at_measured_load(found)
         settings = response_settings(loaded.gearbox, found, method)
-        assembly = loaded.assembly()
+        assembly_at = loaded.assembly_at_loads(found)
         path = loaded.measured_path(found.name)
         loaded.keep_case()
         with time_noted(loaded.folder, f"measured {found.name}, {self.choice.variant}, {self.choice.mesh_model}"):
-            response = stored_or_computed(path.with_name(f"{path.stem}-steady.nc"), assembly, settings, progress)
-            limits = damping_extremes(assembly, response, settings)
+            stored = path.with_name(f"{path.stem}-steady.nc")
+            at_mean = stored_or_computed(stored, assembly_at(1.0), settings, progress)
+            response, limits = at_mean, None
+            if method != "nonlinear":  # with another load or damping, it may lead to another state
+                speeds, harmonics = at_mean["speed"].to_numpy(), int(at_mean.attrs["harmonics"])
+                models = LoadedModels.of(assembly_at, found.torque, speeds, harmonics, settings)
+                response = models.response(at_mean, settings, found.section.harmonics)
+                limits = damping_extremes(models, response, settings, found)
             comparison = compare_run_up(loaded.gearbox, found, response, limits)
             comparison.write(path)
         return comparison
@@ -389,6 +396,25 @@ class Project(ReprMixin):
         if gearbox is loaded.gearbox:
             return loaded
         return loaded.replaced(gearbox, loaded.folder / f"at-measured-{run_up.name}")
+
+    def assembly_at_loads(
+        self, run_up: MeasuredRunUp, values: Mapping[str, float] | None = None
+    ) -> Callable[[float], Assembly]:
+        """Return a function that assembles the gearbox at a torque over the mean torque of a run-up.
+
+        Parameters
+        ----------
+        values : other numbers of the gearbox file, by key
+        """
+        from exugear.steady.evaluation.run_up import gearbox_at_torque
+
+        stiffness, bodies = self.stiffness(), self.bodies()
+
+        def assembly_at(load: float) -> Assembly:
+            gearbox = gearbox_at_torque(self.gearbox, run_up, load) if load != 1.0 else self.gearbox
+            return assemble(gearbox.varied(values or {}), self.choice, stiffness, bodies)
+
+        return assembly_at
 
     def fit_measured(
         self, comparison: MeasuredComparison, keys: Sequence[str], method: Method = "parametric"
@@ -417,12 +443,10 @@ class Project(ReprMixin):
         loaded = self.at_measured_load(cuts.run_up)
         settings = response_settings(loaded.gearbox, cuts.run_up, method)
         start, limits = start_of_fit(loaded.gearbox, keys)
-        stiffness, bodies = loaded.stiffness(), loaded.bodies()
 
         def levels(values: Mapping[str, float]) -> Floats:
-            gearbox = loaded.gearbox.varied({key: float(value) for key, value in values.items()})
-            assembly = assemble(gearbox, loaded.choice, stiffness, bodies)
-            return response_levels(assembly, cuts, settings, comparison.harmonics)
+            own = {key: float(value) for key, value in values.items()}
+            return response_levels(loaded.assembly_at_loads(cuts.run_up, own), cuts, settings, comparison.harmonics)
 
         with np.errstate(divide="ignore"):
             measured = 20.0 * np.log10(np.abs(cuts.measured))

@@ -29,4 +29,5 @@ def renders() -> bool:
 
 needs_gmsh = pytest.mark.skipif(not works("gmsh"), reason="gmsh (extra mesh) or its system libraries are missing")
 needs_meshio = pytest.mark.skipif(not works("meshio"), reason="meshio (extra mesh) is missing")
+needs_asammdf = pytest.mark.skipif(not works("asammdf"), reason="asammdf (extra mdf) is missing")
 needs_rendering = pytest.mark.skipif(not renders(), reason="no pyvista or no OpenGL on this machine")

@@ -24,6 +24,7 @@ ORDER = (
     "elastic_shaft",
     "step_housing",
     "steady_contact_loss",
+    "measured_run_up",
     "turbine_loads",
     "rexs_file",
     "compare_designs",

@@ -439,6 +439,13 @@ def errors_of_measurements(case: GearboxFile, named_bodies: Mapping[str, Body]) 
             if section.place is not None and section.place not in places:
                 known = known_names("bearings and mounts", places, "bearings.NAME", section.place)
                 yield f"{key}.channels.{channel}.place = {section.place!r}: no such place; {known}"
+            ends = (case.overall.input, case.overall.output)
+            for encoder, kind, end in zip(section.encoders or (), ("input", "output"), ends, strict=False):
+                if encoder.shaft != end:
+                    yield (
+                        f"{key}.channels.{channel}.encoders: shaft = {encoder.shaft!r}, but the overall {kind} is "
+                        f"{end!r}; state the encoder of the input first, then that of the output"
+                    )
             if section.body is not None and section.body not in turning:
                 known = known_names("bodies", turning, "bodies.NAME", section.body)
                 yield f"{key}.channels.{channel}.body = {section.body!r}: no such body; {known}"

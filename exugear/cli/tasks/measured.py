@@ -55,12 +55,15 @@ def measured(
     at_load.prepare()
     try:
         comparison = project.measured(run_up, method)
-        fit = project.fit_measured(comparison, keys, method) if keys else None
     except TooShortError as error:
         raise BadInputError(f"measurements.{run_up.name}.window_revolutions: {error}") from error
-    except FitError as error:
-        raise FailedError(f"fit: {error}") from error
-    lines, failure = _fit_lines(fit), ""
+    fit, failure = None, ""
+    if keys:
+        try:
+            fit = project.fit_measured(comparison, keys, method)
+        except FitError as error:  # the comparison is valid without a fit
+            failure = f"fit: {error}"
+    lines = _fit_lines(fit)
     if copy is not None and fit is not None:
         try:
             project.gearbox.write_copy(copy, fit.changes)

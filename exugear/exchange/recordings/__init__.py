@@ -1,1 +1,1 @@
-"""Recordings of measurements: UNV data set 58, CSV, WAV, HDF5 and netCDF files, read as channels over time."""
+"""Recordings of measurements: UNV data set 58, CSV, WAV, HDF5, netCDF and MDF files, read as channels over time."""

@@ -1,10 +1,11 @@
-"""Recordings by their extension: universal files, comma-separated tables, WAV, HDF5 and netCDF files."""
+"""Recordings by their extension: universal files, comma-separated tables, WAV, HDF5, netCDF and MDF files."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
 
+from exugear.exchange.recordings.mdf4 import read_mdf
 from exugear.exchange.recordings.recording import Recording, RecordingError
 from exugear.exchange.recordings.tables import read_table
 from exugear.exchange.recordings.unv58 import read_unv
@@ -13,7 +14,7 @@ from exugear.exchange.series_files import LARGEST_SERIES
 from exugear.gearbox.named_files import NamedFileError, check_regular
 from fe_ste.tools.files import FileError
 
-RECORDING_ENDINGS = (".unv", ".uff", ".uf", ".58", ".csv", ".txt", ".wav", ".h5", ".hdf5", ".nc")
+RECORDING_ENDINGS = (".unv", ".uff", ".uf", ".58", ".csv", ".txt", ".wav", ".h5", ".hdf5", ".nc", ".mf4", ".mdf")
 
 
 def read_recording(path: str | Path, channels: Sequence[str] | None = None) -> Recording:
@@ -22,7 +23,7 @@ def read_recording(path: str | Path, channels: Sequence[str] | None = None) -> R
     Parameters
     ----------
     path : universal file (``.unv``, ``.uff``, ``.uf``, ``.58``), table (``.csv``, ``.txt``), ``.wav``, HDF5 (``.h5``,
-        ``.hdf5``) or netCDF 4 (``.nc``) file
+        ``.hdf5``), netCDF 4 (``.nc``) or, with asammdf, MDF (``.mf4``, ``.mdf``) file
     channels : names of the channels, in upper or lower case; all by default
 
     Raises
@@ -58,6 +59,8 @@ def read_recording(path: str | Path, channels: Sequence[str] | None = None) -> R
             from exugear.exchange.recordings.hdf5 import read_hdf5  # a library that other formats do not need
 
             return read_hdf5(path, channels)
+        if ending in (".mf4", ".mdf"):
+            return read_mdf(path, channels)
     except NamedFileError as error:
         raise RecordingError(f"{path}: {error}") from None
     except FileError as error:

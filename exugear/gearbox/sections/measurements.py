@@ -44,11 +44,15 @@ class MeasuredChannelSection(Section):
     """Name of the channel in the file; by default the name of this table."""
     quantity: MeasuredQuantity
     """Measured quantity. Displacement, velocity and acceleration are those of the seat of a bearing or mount, force is
-    the dynamic force there, and the transmission error is the overall one as a length. The mean torque of a shaft sets
-    the load of the computed side; only one channel may have it.
+    the dynamic force there, and the transmission error is the overall one as a length. The torque of a shaft sets the
+    load of the computed side over the speed; only one channel may have it.
     """
     unit: _UnitText | None = None
     """Unit of its values, such as `g`; by default that of the file."""
+    encoders: Annotated[tuple[TachoSection, TachoSection], Field(strict=False)] | None = None
+    """Encoders of the overall input and the overall output, whose pulses give the transmission error; their lines are
+    `pulses_per_revolution`. The channel then has no other keys.
+    """
     full_scale: q.FullScale | None = None
     """Value at full scale in `unit`, for WAV files."""
     place: Name | None = None
@@ -60,6 +64,12 @@ class MeasuredChannelSection(Section):
 
     @model_validator(mode="after")
     def _place(self) -> MeasuredChannelSection:
+        if self.encoders is not None:
+            stated = [key for key in ("channel", "unit", "full_scale") if getattr(self, key) is not None]
+            if self.quantity != "transmission_error":
+                raise ValueError('encoders apply to the transmission error only; set quantity = "transmission_error"')
+            if stated:
+                raise ValueError(f"{stated[0]} does not apply to a transmission error by encoders; remove the key")
         at_place = self.quantity not in ("transmission_error", "torque")
         for key in ("place", "direction"):
             if not at_place and getattr(self, key) is not None:
@@ -85,7 +95,7 @@ class MeasurementSection(Section):
     """A recorded run-up, which `exugear measured` compares with the steady-state response."""
 
     file: FileName
-    """Recording (UNV data set 58, CSV, WAV, HDF5 or netCDF), in the folder of the gearbox file."""
+    """Recording (UNV data set 58, CSV, WAV, HDF5, netCDF or MDF), in the folder of the gearbox file."""
     description: Text = ""
     """Description for the user."""
     tacho: TachoSection | None = None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,7 +33,7 @@ from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.system.tooth_mesh.placement import MeshError
 from exugear.system.tooth_mesh.tables import fitting_table
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.files import FileError
+from fe_ste.tools.files import FileError, file_digest
 from fe_ste.transmission_error.contact_stress import face_load_factor, largest_contact_stress
 from fe_ste.transmission_error.cycle import harmonics_of
 from fe_ste.transmission_error.surface import SteSurface
@@ -208,15 +209,33 @@ def _stored_measured(context: Context) -> Iterator[xr.Dataset]:
                 context.notes.left_out.append(f"{context.name_of(path)}: {error}")
                 continue
             own = data.attrs
-            if comparison_hash(str(own["recording_sha256"]), section, found) == own["input_hash"]:
-                yield data.assign_attrs({key: response.attrs[key] for key in ("variant", "mesh_model", "inertias")})
-            else:
+            if comparison_hash(str(own["recording_sha256"]), section, found) != own["input_hash"]:
                 context.notes.left_out.append(f"{context.name_of(path)}: {OTHER_INPUT}")
-        for path in sorted(context.folder.glob(f"at-*/*/*/measured-{name}.nc")):
+            elif _is_replaced(context.gearbox, name, str(own["recording_sha256"])):
+                context.notes.left_out.append(
+                    f"{context.name_of(path)}: its recording {section.file} was replaced; run exugear measured again"
+                )
+            else:
+                yield data.assign_attrs({key: response.attrs[key] for key in ("variant", "mesh_model", "inertias")})
+        at_loads = (context.folder.glob(f"{depth}/*/*/measured-{name}.nc") for depth in ("at-*", "at-*/at-*"))
+        for path in sorted(chain(*at_loads)):
             folder = path.parents[2]
             context.notes.left_out.append(
                 f"{context.name_of(path)}: is at another load; exugear report {shown_path(folder)} shows it"
             )
+
+
+def _is_replaced(gearbox: Gearbox, name: str, digest: str) -> bool:
+    """Return whether the recording of a measurement has another SHA-256; without the recording it is not known.
+
+    Results are also looked at where the recording, which is much larger, is missing.
+    """
+    from exugear.steady.evaluation.run_up import recording_path  # for measurements only
+
+    try:
+        return file_digest(recording_path(gearbox, name)) != digest
+    except (GearboxFileError, FileError):
+        return False
 
 
 def _stored_tables(context: Context) -> dict[str, MeshTable]:

@@ -148,7 +148,8 @@ def order_spectrum(values: Floats, shaft: ShaftAngle, per: float = 1.0) -> Order
     length = REVOLUTIONS * count
     if even.size < length * (FEWEST_WINDOWS + 1) // 2:
         return None
-    frames = overlapping_frames(np.interp(even, turns, values), length, 0.5)
+    # In single precision, which takes half the time and is 100 dB below the range of orders that are reported.
+    frames = overlapping_frames(np.interp(even, turns, values).astype(np.float32), length, 0.5)
     # The images of high frequencies that linear interpolation leaves are above this order.
     top = int(0.4 * shaft.rate / speed.max() * REVOLUTIONS)
     spectra = [

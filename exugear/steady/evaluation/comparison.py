@@ -188,12 +188,8 @@ def compared_cuts(run_up: MeasuredRunUp, response: xr.Dataset, limits: SingleCom
     amplitudes = [complex_amplitudes(response)[:, places], *(() if limits is None else limits[:, :, places])]
     names = [str(name) for name in response["signal"].to_numpy()]
     speed, *transfers = transfers_of(run_up, names, response["speed"].to_numpy(), lines, amplitudes)
-    swept = np.full((len(transfers), *found[:, : len(lines)].shape), np.nan, dtype=np.complex128)
-    for number, transfer in enumerate(transfers):
-        for place, line in enumerate(lines):
-            own = swept_cut(speed, transfer[:, place], line.order, run_up.shaft, window, per)
-            count = min(own.shape[1], frames.speed.size)
-            swept[number, :, place, :count] = own[:, :count]
+    swept = swept_lines(speed, np.concatenate(transfers), lines, run_up, frames.speed.size)
+    swept = swept.reshape(len(transfers), -1, *swept.shape[1:])
     if not np.abs(transfers[0]).max() > 0.0:
         raise SteadyError(
             f"mesh model {response.attrs['mesh_model']}: its mesh stiffness is constant and excites no vibration to "
@@ -213,6 +209,18 @@ def compared_cuts(run_up: MeasuredRunUp, response: xr.Dataset, limits: SingleCom
         steady=np.where(inside, steady, np.nan),
         limits=None if limits is None else np.abs(swept[1:]),
     )
+
+
+def swept_lines(
+    speed: Floats, transfer: Complexes, lines: Sequence[OrderLine], run_up: MeasuredRunUp, windows: int
+) -> Complexes:
+    """Order cuts (channels, lines, windows) that a run-up shows of transfers (channels, lines, points) at speeds."""
+    found = np.full((*transfer.shape[:2], windows), np.nan, dtype=np.complex128)
+    for place, line in enumerate(lines):
+        own = swept_cut(speed, transfer[:, place], line.order, run_up.shaft, run_up.window, run_up.per)
+        count = min(own.shape[1], windows)
+        found[:, place, :count] = own[:, :count]
+    return found
 
 
 def transfers_of(

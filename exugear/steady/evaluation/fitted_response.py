@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.sections.entries import quantities
-from exugear.steady.balance.response import signals
-from exugear.steady.evaluation.comparison import ComparedCuts, harmonic_rows, transfers_of
+from exugear.steady.evaluation.comparison import ComparedCuts, swept_lines, transfers_of
 from exugear.steady.evaluation.fit import MOST_PARAMETERS
-from exugear.steady.evaluation.swept import swept_cut
-from exugear.steady.point_solver import PointSolver, harmonic_balance_model
+from exugear.steady.evaluation.load_over_speed import LoadedModels
 from exugear.steady.settings import SteadySettings
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Floats
@@ -57,27 +55,22 @@ def start_of_fit(gearbox: Gearbox, keys: Sequence[str]) -> tuple[dict[str, float
     return {key: known[key][0] for key in keys}, {key: known[key][1] for key in keys}
 
 
-def response_levels(assembly: Assembly, cuts: ComparedCuts, settings: SteadySettings, harmonics: int) -> Floats:
+def response_levels(
+    assembly_at: Callable[[float], Assembly], cuts: ComparedCuts, settings: SteadySettings, harmonics: int
+) -> Floats:
     """Levels (channels, lines, windows), dB re 1 SI unit, that the measurement would show of a gearbox.
 
     Parameters
     ----------
+    assembly_at : gearbox at a torque over the mean torque of the run-up
     cuts : comparison with the response at the start, whose orders and windows are used
     settings : of that response; its range of speeds is used with fewer speeds
     harmonics : of that response
     """
     speeds = np.linspace(settings.speeds.first, settings.speeds.last, SPEEDS)
-    model = harmonic_balance_model(assembly, speeds, harmonics, settings.combinations)
-    rows = harmonic_rows(model.lines.index, model.base_names, cuts.run_up.section.harmonics)
-    places = [rows[line.name] for line in cuts.lines]
-    solver = PointSolver(model, settings.method)
-    amplitude = np.array([2.0 * signals(model, solver.response(float(own)))[places] for own in speeds])
-    names = [signal.name for signal in model.signal_names]
-    speed, transfer = transfers_of(cuts.run_up, names, speeds, cuts.lines, [amplitude.astype(np.complex64)])
-    windows = cuts.speed.size
-    found = np.full(cuts.measured.shape, np.nan)
-    for place, line in enumerate(cuts.lines):
-        own = swept_cut(speed, transfer[:, place], line.order, cuts.run_up.shaft, cuts.run_up.window, cuts.run_up.per)
-        count = min(own.shape[1], windows)
-        found[:, place, :count] = 20.0 * np.log10(np.abs(own[:, :count]))
-    return found
+    models = LoadedModels.of(assembly_at, cuts.run_up.torque, speeds, harmonics, settings)
+    names = [line.name for line in cuts.lines]
+    amplitude = models.amplitudes(speeds, settings, cuts.run_up.section.harmonics, names).astype(np.complex64)
+    speed, transfer = transfers_of(cuts.run_up, models.signal_names, speeds, cuts.lines, [amplitude])
+    swept = swept_lines(speed, transfer, cuts.lines, cuts.run_up, cuts.speed.size)
+    return np.asarray(20.0 * np.log10(np.abs(swept)))

@@ -43,6 +43,7 @@ from exugear.steady.evaluation.mistakes import (
     speed_finding,
 )
 from exugear.steady.evaluation.run_up import MeasuredRunUp
+from exugear.steady.steady_file import settings_of
 from fe_ste.tools.arrays import SingleComplexes
 from fe_ste.tools.display import ReprMixin, TitledRows
 from fe_ste.tools.drawing import (
@@ -231,15 +232,13 @@ class MeasuredComparison(ReprMixin):
 
     def _cut_rows(self) -> Iterator[list[float | str]]:
         cuts = self.cuts
-        for place, channel in enumerate(cuts.run_up.channels):
-            for number, line in enumerate(cuts.lines):
-                for frame, speed in enumerate(cuts.speed):
-                    at = (place, number, frame)
-                    yield [
-                        channel.name, line.name, line.order, float(cuts.time[frame]), float(speed) / RPM,
-                        float(np.abs(cuts.measured[at])), float(np.abs(cuts.computed[at])), float(cuts.steady[at]),
-                        float(cuts.background[at]),
-                    ]  # fmt: skip
+        at = [(f"{time:.9g}", f"{speed:.9g}") for time, speed in zip(cuts.time, cuts.speed / RPM, strict=True)]
+        amplitudes = np.stack([np.abs(cuts.measured), np.abs(cuts.computed), cuts.steady, cuts.background], axis=-1)
+        for channel, of_channel in zip(cuts.run_up.channels, amplitudes, strict=True):
+            for line, own in zip(cuts.lines, of_channel.tolist(), strict=True):
+                order = f"{line.order:.9g}"
+                for (time, speed), values in zip(at, own, strict=True):
+                    yield [channel.name, line.name, order, time, speed, *values]
 
     def _dataset(self) -> xr.Dataset:
         """Labelled arrays with units."""
@@ -329,7 +328,10 @@ PEAK_HEADINGS = (
 
 
 def compare_run_up(
-    gearbox: Gearbox, run_up: MeasuredRunUp, response: xr.Dataset, limits: SingleComplexes | None = None
+    gearbox: Gearbox,
+    run_up: MeasuredRunUp,
+    response: xr.Dataset,
+    limits: SingleComplexes | None = None,
 ) -> MeasuredComparison:
     """Compare a measured run-up with a steady-state response over its speeds.
 
@@ -353,7 +355,7 @@ def compare_run_up(
     found: Sequence[Iterator[Finding]] = (
         speed_finding(gearbox, run_up, spectrum),
         recording_findings(run_up),
-        load_finding(run_up),
+        load_finding(run_up, settings_of(response.attrs).method),
         band_findings(cuts),
         drift_finding(cuts),
         level_findings(cuts),

@@ -26,7 +26,9 @@ from exugear.results.order_tracking.foreign_orders import (
     standing_orders,
 )
 from exugear.steady.evaluation.comparison import ComparedCuts
+from exugear.steady.evaluation.load_over_speed import loads_of
 from exugear.steady.evaluation.run_up import INTEGRATIONS, MeasuredRunUp
+from exugear.steady.settings import Method
 from fe_ste.tools.arrays import Floats
 
 CLIPPED = 1e-4
@@ -95,23 +97,31 @@ def band_findings(cuts: ComparedCuts) -> Iterator[Finding]:
         )
 
 
-def load_finding(run_up: MeasuredRunUp) -> Iterator[Finding]:
-    """Yield the torque of the run-up, how much it varies, and what this changes.
+def load_finding(run_up: MeasuredRunUp, method: Method = "parametric") -> Iterator[Finding]:
+    """Yield the torque of the run-up, how much it varies, and how the computed side takes it.
 
     Forces of a varying mesh stiffness are proportional to the torque, thus levels to its logarithm.
+
+    Parameters
+    ----------
+    method : of the response; states of `nonlinear` are those at the mean torque
     """
     if run_up.torque is None:
         return
     body, mean, (low, high) = run_up.torque.body, run_up.torque.mean, run_up.torque.ends
-    text = f"torque of {body}: mean {mean:.4g} N m, {low:.4g} to {high:.4g} N m over the run-up; computed at the mean"
+    text = f"torque of {body}: mean {mean:.4g} N m, {low:.4g} to {high:.4g} N m over the run-up"
     if not low * high > 0.0:
-        yield Finding("warning", f"{text}; it changes its sign, so that teeth separate: measure at a steady load", mean)
+        remedy = "it changes its sign, so that teeth separate: measure at a steady load"
+        yield Finding("warning", f"{text}; computed at the mean; {remedy}", mean)
+        return
+    if method != "nonlinear" and len(loads_of(run_up.torque)) > 1:
+        yield Finding("note", f"{text}; computed at the torque of each speed", mean)
         return
     changes = sorted(20.0 * math.log10(end / mean) for end in (low, high))
     yield Finding(
         "warning" if max(map(abs, changes)) > VARYING_LOAD else "note",
-        f"{text}, which changes levels by {-changes[1]:+.2f} to {-changes[0]:+.2f} dB where vibration is proportional "
-        "to the torque",
+        f"{text}; computed at the mean, which changes levels by {-changes[1]:+.2f} to {-changes[0]:+.2f} dB where "
+        "vibration is proportional to the torque",
         mean,
     )
 

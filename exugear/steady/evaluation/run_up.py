@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +15,10 @@ from exugear.exchange.recordings.recording import RecordedChannel, Recording, Re
 from exugear.exchange.series_files import LARGEST_SERIES
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import known_names
-from exugear.gearbox.sections.measurements import MeasuredChannelSection, MeasurementSection
+from exugear.gearbox.sections.measurements import MeasuredChannelSection, MeasurementSection, TachoSection
 from exugear.gearbox.units import MEASURED_UNITS, RPM, Unit, unit_of
 from exugear.results.order_tracking.angle_cuts import AngleWindow
+from exugear.results.order_tracking.encoders import check_lines, encoder_angle, error_of_angles
 from exugear.results.order_tracking.shaft_angle import ShaftAngle, SpeedSignalError, angle_of_speed, angle_of_tacho
 from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.settings import USUAL_COUNT, Method, SpeedRange, SteadySettings, check_speeds, usual_speeds
@@ -25,9 +27,11 @@ from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.files import file_digest
 
 LOAD_PARTS = 50
-"""Number of equal parts of a run-up whose mean torques are compared."""
+"""Number of equal parts of a run-up, and of its range of speeds, within which the torque is averaged."""
 SAME_LOAD = 0.01
 """Relative difference from the static load up to which the mean torque is not applied: 0.09 dB of a level."""
+SAME_TURNS = 0.005
+"""Relative difference up to which revolutions by an encoder and by the tacho are the same."""
 LEAST_RANGE = 1.1
 """Lowest ratio of the highest to the lowest speed of a run-up."""
 BEYOND = 0.02
@@ -96,26 +100,36 @@ class MeasuredChannel:
         return np.asarray(vector / (2j * np.pi * frequency) ** turns)
 
 
-@dataclass(frozen=True)
-class MeasuredTorque:
+@dataclass(frozen=True, eq=False)
+class MeasuredTorque(ReprMixin, line=" of {body!r}: mean {mean:g} N m, {ends[0]:g} to {ends[1]:g} N m"):
     """Torque on a body during a run-up, N m, in the sense of the sensor."""
 
     body: str
     mean: float
     ends: tuple[float, float]
     """Lowest and highest mean of the parts of the run-up."""
+    speed: Floats
+    over_speed: Floats
+    """(k,) speeds of the input, rad/s, ascending, and mean torques over the ranges of speed around them."""
 
     @classmethod
-    def of(cls, body: str, values: Floats) -> MeasuredTorque:
+    def of(cls, body: str, values: Floats, speed: Floats) -> MeasuredTorque:
         """Return the torque of a signal (n,), N m, whose vibration is averaged within `LOAD_PARTS` parts.
+
+        Parts are of equal time for `ends`, and of equal ranges of the speed (n,), rad/s, for `over_speed`.
 
         Examples
         --------
-        >>> MeasuredTorque.of("input", np.linspace(99.0, 101.0, 5000))
-        MeasuredTorque(body='input', mean=100.0, ends=(99.0198..., 100.9801...))
+        >>> MeasuredTorque.of("input", np.linspace(99.0, 101.0, 5000), np.linspace(50.0, 100.0, 5000))
+        <MeasuredTorque of 'input': mean 100 N m, 99.0198 to 100.98 N m>
         """
         means = [float(part.mean()) for part in np.array_split(values, LOAD_PARTS)]
-        return cls(body, float(values.mean()), (min(means), max(means)))
+        edges = np.linspace(speed.min(), speed.max(), LOAD_PARTS + 1)
+        part = np.clip(np.searchsorted(edges, speed, side="right") - 1, 0, LOAD_PARTS - 1)
+        count = np.bincount(part, minlength=LOAD_PARTS)
+        sums = [np.bincount(part, own, LOAD_PARTS)[count > 0] for own in (speed, values)]
+        own_speed, torque = (total / count[count > 0] for total in sums)
+        return cls(body, float(values.mean()), (min(means), max(means)), own_speed, torque)
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,6 +180,17 @@ def measurement_of(gearbox: Gearbox, name: str | None) -> tuple[str, Measurement
     return name, known[name]
 
 
+def recording_path(gearbox: Gearbox, name: str) -> Path:
+    """Path of the recording of a measurement.
+
+    Raises
+    ------
+    GearboxFileError
+        It does not exist or may not be read.
+    """
+    return gearbox.file(f"measurements.{name}.file", gearbox.case.measurements[name].file, LARGEST_SERIES)
+
+
 def read_run_up(gearbox: Gearbox, name: str | None = None) -> MeasuredRunUp:
     """Read a measured run-up that a gearbox file names.
 
@@ -181,12 +206,12 @@ def read_run_up(gearbox: Gearbox, name: str | None = None) -> MeasuredRunUp:
     """
     name, section = measurement_of(gearbox, name)
     key = f"measurements.{name}"
-    path = gearbox.file(f"{key}.file", section.file, LARGEST_SERIES)
+    path = recording_path(gearbox, name)
     source = section.tacho or section.speed
     assert source is not None  # checked with the section
-    files = {own: channel.channel or own for own, channel in section.channels.items()}
+    files = {own: _files_of(own, channel) for own, channel in section.channels.items()}
     try:
-        recording = read_recording(path, list(dict.fromkeys([source.channel, *files.values()])))
+        recording = read_recording(path, list(dict.fromkeys([source.channel, *chain(*files.values())])))
     except RecordingError as error:
         raise gearbox.error(f"{key}.file = {section.file!r}: {error}") from None
     turning, per = _shaft_angle(gearbox, key, section, recording)
@@ -200,10 +225,17 @@ def read_run_up(gearbox: Gearbox, name: str | None = None) -> MeasuredRunUp:
     part = slice(shaft.first, shaft.first + shaft.angle.size)
     values, torque = [], None
     for own, channel in section.channels.items():
-        recorded = recording.channel(files[own])
+        if channel.encoders is not None:
+            values.append(
+                _error_by_encoders(
+                    gearbox, f"{key}.channels.{own}.encoders", section, channel.encoders, recording, shaft
+                )
+            )
+            continue
+        recorded = recording.channel(files[own][0])
         factor = _factor(gearbox, f"{key}.channels.{own}", channel, recorded)
         if channel.body is not None:
-            torque = MeasuredTorque.of(channel.body, factor * recorded.values[part])
+            torque = MeasuredTorque.of(channel.body, factor * recorded.values[part], shaft.speed)
             continue
         if not np.ptp(recorded.values[part]) > 0.0:
             raise gearbox.error(
@@ -223,15 +255,19 @@ def read_run_up(gearbox: Gearbox, name: str | None = None) -> MeasuredRunUp:
             _measured(own, channel) for own, channel in section.channels.items() if channel.quantity != "torque"
         ),
         values=np.array(values),
-        clipped={own: recording.channel(files[own]).clipped for own in section.channels},
+        clipped={own: recording.channel(names[0]).clipped for own, names in files.items() if len(names) == 1},
         torque=torque,
     )
 
 
-def gearbox_at_torque(gearbox: Gearbox, run_up: MeasuredRunUp) -> Gearbox:
+def gearbox_at_torque(gearbox: Gearbox, run_up: MeasuredRunUp, share: float = 1.0) -> Gearbox:
     """Return the gearbox with its static load scaled to the mean torque of a run-up, or itself if they agree to 1 %.
 
     The sense of the static load stays, because that of a torque sensor is a convention of the test rig.
+
+    Parameters
+    ----------
+    share : torque over the mean torque to which the static load is scaled; other shares than 1 are always applied
 
     Raises
     ------
@@ -245,10 +281,10 @@ def gearbox_at_torque(gearbox: Gearbox, run_up: MeasuredRunUp) -> Gearbox:
     if not static.get(body):
         known = ", ".join(name for name, torque in static.items() if torque)
         raise gearbox.error(f"{key}.body = {body!r}: the static load has no torque on it; name one of {known}")
-    factor = abs(run_up.torque.mean / static[body])
+    factor = share * abs(run_up.torque.mean / static[body])
     if not factor > 0.0:
         raise gearbox.error(f"{key}: the mean torque is zero; connect its sensor, or remove the channel")
-    if abs(factor - 1.0) <= SAME_LOAD:
+    if share == 1.0 and abs(factor - 1.0) <= SAME_LOAD:
         return gearbox
     torques = gearbox.case.static_load.torques_N_m
     return gearbox.varied({"static_load.torques_N_m": {name: factor * own for name, own in torques.items()}})
@@ -297,6 +333,40 @@ def _shaft_angle(
         return angle_of_speed(unit.factor * recorded.values, recording.rate), per
     except SpeedSignalError as error:
         raise gearbox.error(f"{key}.{kind}.channel = {channel!r}: {error}") from None
+
+
+def _files_of(name: str, channel: MeasuredChannelSection) -> tuple[str, ...]:
+    """Names in the file of a channel: its own, or those of its two encoders."""
+    return tuple(own.channel for own in channel.encoders) if channel.encoders else (channel.channel or name,)
+
+
+def _error_by_encoders(
+    gearbox: Gearbox,
+    key: str,
+    section: MeasurementSection,
+    encoders: Sequence[TachoSection],
+    recording: Recording,
+    shaft: ShaftAngle,
+) -> Floats:
+    """Overall transmission error, m, by the encoders of input and output at the samples of the angle of the input."""
+    turns = gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
+    name, order = max(gearbox.mesh_orders(section.harmonics).items(), key=lambda own: own[1])
+    angles = []
+    for encoder in encoders:
+        lines, per = encoder.pulses_per_revolution, abs(turns[encoder.shaft])
+        try:
+            check_lines(lines, order / per, name)
+            angle = encoder_angle(recording.channel(encoder.channel).values, recording.rate, lines, shaft.time)
+        except SpeedSignalError as error:
+            raise gearbox.error(f"{key}: channel {encoder.channel!r} {error}") from None
+        counted, expected = (float(own[-1] - own[0]) / (2.0 * np.pi) for own in (angle, per * shaft.angle))
+        if abs(counted / expected - 1.0) > SAME_TURNS:
+            raise gearbox.error(
+                f"{key}: channel {encoder.channel!r} counts {counted:.5g} revolutions of {encoder.shaft} with {lines} "
+                f"pulses_per_revolution, and the run-up has {expected:.5g}; check its lines, its channel and its shaft"
+            )
+        angles.append(angle)
+    return gearbox.output_radius * error_of_angles(angles[0], angles[1], gearbox.train.ratio)
 
 
 def _unit(gearbox: Gearbox, key: str, stated: str | None, recorded: RecordedChannel, quantity: str) -> Unit:

@@ -70,19 +70,32 @@ def swept_cut(
     # The excitation turns one way only: its band begins at zero and ends at the sampling rate.
     frequency = np.arange(size) * coarse.rate / size
     frequency = np.where(frequency > 0.95 * coarse.rate, frequency - coarse.rate, frequency)
-    at = np.clip(2.0 * np.pi * frequency / order, speed[0], speed[-1])
-    back = np.exp(-1j * order * angle)
+    transfer = _interpolated(speed, amplitude, 2.0 * np.pi * frequency / order)
+    back = excitation[held : held + angle.size].conj()
     envelope = np.empty((len(amplitude), angle.size), dtype=np.complex128)
-    for own, values in zip(envelope, amplitude, strict=True):
-        transfer = _interpolated(speed, values, at)
-        own[:] = scipy.fft.ifft(transfer * spectrum)[held : held + angle.size] * back
+    for own, values in zip(envelope, transfer, strict=True):
+        values *= spectrum
+        own[:] = scipy.fft.ifft(values, overwrite_x=True)[held : held + angle.size]
+        own *= back
     return mean_over_angle(envelope, coarse, window, per)
 
 
 def _interpolated(speed: Floats, amplitude: Complexes, at: Floats) -> Complexes:
-    """Monotone cubic interpolation between the speeds, and linear interpolation between its closely spaced values."""
+    """Amplitudes (channels, k) at speeds (k,), those at the ends beyond them.
+
+    Interpolation is monotone cubic between the speeds, and linear between its closely spaced values.
+    """
     from scipy.interpolate import PchipInterpolator
 
-    fine = np.interp(np.arange(STEPS_PER_SPEED * (speed.size - 1) + 1) / STEPS_PER_SPEED, np.arange(speed.size), speed)
-    real, imaginary = (PchipInterpolator(speed, part)(fine) for part in (amplitude.real, amplitude.imag))
-    return np.asarray(np.interp(at, fine, real) + 1j * np.interp(at, fine, imaginary))
+    steps = np.arange(STEPS_PER_SPEED * (speed.size - 1) + 1) / STEPS_PER_SPEED
+    fine = np.interp(steps, np.arange(speed.size), speed)
+    real, imaginary = (PchipInterpolator(speed, part, axis=1)(fine) for part in (amplitude.real, amplitude.imag))
+    known = real + 1j * imaginary
+    place = np.interp(at, fine, np.arange(fine.size))
+    before = np.minimum(place.astype(np.int64), fine.size - 2)
+    share = place - before
+    found = np.empty((len(amplitude), at.size), dtype=np.complex128)
+    for own, values in zip(found, known, strict=True):
+        own[:] = values[before]
+        own += share * np.diff(values)[before]
+    return found

@@ -308,13 +308,13 @@ def test_an_unknown_channel_is_named_with_those_like_it(tmp_path, signals):
 def test_what_is_no_file_is_refused_without_waiting(tmp_path):
     os.mkfifo(tmp_path / "pipe.unv")
     (tmp_path / "folder.wav").mkdir()
-    cases = {"pipe.unv": "a pipe or device", "folder.wav": "a folder", "none.csv": "no such file", "a.mf4": "no such"}
+    cases = {"pipe.unv": "a pipe or device", "folder.wav": "a folder", "none.csv": "no such file", "a.tdms": "no such"}
     for name, message in cases.items():
         with pytest.raises(RecordingError, match=message):
             read_recording(tmp_path / name)
-    (tmp_path / "a.mf4").write_bytes(b"MDF     4.10")
-    with pytest.raises(RecordingError, match="ends in .mf4; recordings end in .unv"):
-        read_recording(tmp_path / "a.mf4")
+    (tmp_path / "a.tdms").write_bytes(b"TDSm")
+    with pytest.raises(RecordingError, match="ends in .tdms; recordings end in .unv"):
+        read_recording(tmp_path / "a.tdms")
 
 
 @pytest.mark.parametrize("bits", [8, 12, 16, 24])
