@@ -22,7 +22,7 @@ class Kind(StrEnum):
     _ignore_ = ["members", "kind"]
     members = vars()
     for kind in KINDS:
-        members[kind] = kind
+        members[kind.replace("-", "_")] = kind
 
 
 PARALLEL = Kind("parallel")
