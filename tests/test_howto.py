@@ -111,7 +111,7 @@ def run(place: Path, language: str, text: str) -> subprocess.CompletedProcess[st
 
 def test_every_guide_is_in_the_contents_and_most_of_them_run() -> None:
     assert sorted(pages()) == sorted(file.stem for file in GUIDES.glob("*.md") if file.stem != "index")
-    assert sum(bool(blocks(page)) for page in pages()) >= len(pages()) - 2
+    assert sum(bool(blocks(page)) for page in pages()) >= len(pages()) - 3
     assert set(QUICK) | set(LONG) | set(NEEDS_GMSH) <= set(pages())
 
 

@@ -331,7 +331,7 @@ def load_dataset(path: Path, layout: Layout, names: Sequence[str] | None = None)
                 for name, own in dimensions.items()
                 if names is None or name in names or (name in coordinates and over.issuperset(own))
             }
-    dataset = xr.decode_cf(xr.Dataset(arrays, attrs=attributes))
+    dataset = xr.decode_cf(xr.Dataset(arrays, attrs=attributes)).load()
     if names is None:
         return dataset
     return dataset.set_coords(coordinates.intersection(arrays))[list(names)]
