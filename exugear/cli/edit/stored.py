@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import threading
 import tomllib
 from collections.abc import Iterator
@@ -129,9 +130,13 @@ def _locked(path: Path) -> Iterator[None]:
     if fcntl is None or not path.is_file():
         yield
         return
-    with path.open("rb") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        yield
+    while True:
+        with path.open("rb") as file:
+            fcntl.flock(file, fcntl.LOCK_EX)
+            # A file that was replaced while this one waited has another lock.
+            if os.path.samestat(os.fstat(file.fileno()), path.stat()):
+                yield
+                return
 
 
 def digest_of(text: str) -> str:

@@ -139,7 +139,7 @@ def main() -> None:
         answer = {"error": str(error)}
     except MemoryError:
         answer = {"error": f"{path}: does not fit into memory; split the file, or export the channels alone"}
-    except Exception as error:  # noqa: BLE001  asammdf raises what it likes about a damaged file
+    except Exception as error:  # asammdf raises what it likes about a damaged file
         answer = {
             "error": f"{path}: is a damaged MDF file ({type(error).__name__}: {str(error)[:200]}); export it again"
         }
