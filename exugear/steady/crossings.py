@@ -11,6 +11,7 @@ negative.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -46,6 +47,11 @@ GAIN = 1e-3
 """Relative excess of a maximum over its peak at the known speeds from which it is evaluated."""
 APART = 0.25
 """Share of the distance between a peak's neighbours within which two maxima are evaluated together."""
+DRAWN = 10
+"""Highest peaks of each quantity in the range of operation whose flanks are resolved for drawings."""
+FLANK = (0.6, 1.2)
+"""Places of two points on a flank, over the distance at which a resonance falls to 1 / sqrt(2) of its top: they are at
+86 % and 64 % of it."""
 ROUNDS = 4
 """Iterations to a mode at the speed where a line meets it; their error is squared each time."""
 COINCIDE = 1e-6
@@ -210,6 +216,73 @@ def missed_tops(
             if new and height > (1.0 + GAIN) * highest[point, line]:
                 tops.append(top)
     return np.sort(np.array(tops))
+
+
+def missed_flanks(
+    speeds: Floats,
+    amplitude: SingleComplexes,
+    smooth: Booleans,
+    quantities: Sequence[Quantity],
+    operation: tuple[float, float] | None,
+) -> Floats:
+    """Return speeds beside the highest peaks that are drawn as triangles: with fewer than two points above half height.
+
+    Parameters are those of `missed_tops`.
+
+    Notes
+    -----
+    Near the top A of a resonance the amplitude at a distance d is A / sqrt(1 + (d / w)^2). The first point below A / 2
+    on a flank gives w. Other modes may add to that point, and w is too large; the next call then comes closer.
+    """
+    inside = np.ones(len(speeds), dtype=bool)
+    if operation is not None:
+        within = (np.abs(speeds) >= operation[0]) & (np.abs(speeds) <= operation[1])
+        inside = within if within.any() else inside
+    more: list[float] = []
+    for quantity in quantities:
+        sizes = quantity.sizes(amplitude[:, 1:]).max(axis=2)
+        peaks = [
+            (int(point), line)
+            for line, amplitudes in enumerate(sizes.T)
+            for point in standing_peaks(amplitudes)
+            if inside[point]
+        ]
+        peaks.sort(key=lambda peak: -sizes[peak])
+        for point, line in peaks[:DRAWN]:
+            if smooth[_around(point, len(speeds))].all():
+                for side in (slice(point, None), slice(point, None, -1)):
+                    more += _on_flank(speeds[side], sizes[side, line])
+    taken = list(speeds)
+    for speed in sorted(more):
+        if np.abs(np.array(taken) - speed).min() > COINCIDE * abs(speed):
+            taken.append(speed)
+    return np.array(taken[len(speeds) :])
+
+
+def _on_flank(speeds: Floats, amplitude: Floats) -> list[float]:
+    """Return the speeds that a flank lacks; it begins at its peak.
+
+    Examples
+    --------
+    A peak of 1 that falls to 1 / sqrt(2) at 100.1; the flank has no point above half height, and then one:
+
+    >>> def resonance(speeds):
+    ...     return 1.0 / np.hypot(1.0, (speeds - 100.0) / 0.1)
+    >>> coarse, better = np.array([100.0, 101.0, 102.0]), np.array([100.0, 100.06, 101.0])
+    >>> np.round(_on_flank(coarse, resonance(coarse)), 3).tolist()
+    [100.06, 100.12]
+    >>> np.round(_on_flank(better, resonance(better)), 3).tolist()
+    [100.12]
+    """
+    below = np.flatnonzero(amplitude < 0.5 * amplitude[0])
+    if not below.size or below[0] > len(FLANK) or amplitude[below[0]] <= 0.0:
+        return []
+    first = int(below[0])
+    width = (speeds[first] - speeds[0]) / math.sqrt((amplitude[0] / amplitude[first]) ** 2 - 1.0)
+    wanted = [float(speeds[0] + share * width) for share in FLANK]
+    # Of two points, the one that is further from a known one is new.
+    known = speeds[1:first]
+    return sorted(wanted, key=lambda own: -float(np.abs(known - own).min(initial=np.inf)))[: len(FLANK) - len(known)]
 
 
 def _around(point: int, count: int) -> slice:
