@@ -25,7 +25,7 @@ from exugear.steady.balance.response import mean_deviation_forces, transmission_
 from exugear.steady.campbell import ModeTracks
 from exugear.steady.harmonics.branches import NEIGHBOURS, predicted_tops, standing_peaks
 from exugear.steady.mean_system.mean_system import MeanSystem, mean_modes
-from exugear.steady.mean_system.mesh_places import DEFLECTION
+from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT
 from exugear.steady.mean_system.signals import Quantity
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, SingleComplexes
 from fe_ste.tools.threads import side_by_side
@@ -384,6 +384,8 @@ class Contributions:
     """Peak amplitude of the line at the level `linear`, m."""
     meshes: Mapping[str, float]
     """Share by family of meshes, and by stated torque."""
+    shuttling: Mapping[str, float]
+    """Part of the share of a family that is due to the moment of the load that shuttles along the face."""
     modes: tuple[tuple[float, float], ...]
     """Frequency (Hz) and share of each mode that carries a hundredth or more, the strongest first."""
     supports: Mapping[str, float]
@@ -410,15 +412,19 @@ def contributions(model: HarmonicBalanceModel, speed: float, line: int) -> Contr
     motion = np.linalg.solve(dynamic, loads).astype(np.complex128)
     total = complex(row @ motion)
     meshes: dict[str, float] = {}
-    parts = (adjoint @ forces).reshape(len(model.waves.waves), model.ports_at(speed).forces.shape[1]).sum(axis=1)
+    shuttling: dict[str, float] = {}
+    parts = (adjoint @ forces).reshape(len(model.waves.waves), model.ports_at(speed).forces.shape[1])
     for wave, part in zip(model.waves.waves, parts, strict=True):
-        meshes[wave.family] = meshes.get(wave.family, 0.0) + _share(complex(part), total)
+        meshes[wave.family] = meshes.get(wave.family, 0.0) + _share(complex(part.sum()), total)
+        if model.shuttles:
+            moment = _share(complex(part[MISALIGNMENT]), total)
+            shuttling[wave.family] = shuttling.get(wave.family, 0.0) + moment
     for source in dict.fromkeys(filter(None, model.shaft_orders.source)):
         if part := complex(2.0 * adjoint @ model.shaft_loads(speed, source)[line]):
             meshes[source] = meshes.get(source, 0.0) + _share(part, total)
     supports, bodies = _derivatives(model.system, frequency, adjoint, motion, total)
     modes = _modes(model, speed, frequency, loads, row, total)
-    return Contributions(speed, abs(total), meshes, modes, supports, bodies)
+    return Contributions(speed, abs(total), meshes, shuttling, modes, supports, bodies)
 
 
 def loudest_near(model: HarmonicBalanceModel, speed: float, width: float, line: int) -> float:
