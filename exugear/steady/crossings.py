@@ -414,10 +414,10 @@ def contributions(model: HarmonicBalanceModel, speed: float, line: int) -> Contr
     meshes: dict[str, float] = {}
     shuttling: dict[str, float] = {}
     parts = (adjoint @ forces).reshape(len(model.waves.waves), model.ports_at(speed).forces.shape[1])
-    for wave, part in zip(model.waves.waves, parts, strict=True):
-        meshes[wave.family] = meshes.get(wave.family, 0.0) + _share(complex(part.sum()), total)
+    for wave, by_force in zip(model.waves.waves, parts, strict=True):
+        meshes[wave.family] = meshes.get(wave.family, 0.0) + _share(complex(by_force.sum()), total)
         if model.shuttles:
-            moment = _share(complex(part[MISALIGNMENT]), total)
+            moment = _share(complex(by_force[MISALIGNMENT]), total)
             shuttling[wave.family] = shuttling.get(wave.family, 0.0) + moment
     for source in dict.fromkeys(filter(None, model.shaft_orders.source)):
         if part := complex(2.0 * adjoint @ model.shaft_loads(speed, source)[line]):
