@@ -9,6 +9,7 @@ PROJECT_URL ?=
 VENV := .venv
 INSTALLED := $(VENV)/installed
 DOCS_INSTALLED := $(VENV)/installed-docs
+RELEASE_INSTALLED := $(VENV)/installed-release
 RUN := $(VENV)/bin
 WEB_VENV := $(VENV)-web
 NODE := 24.19.0
@@ -83,7 +84,7 @@ FIND_PYTHON := for candidate in $(if $(PYTHON),"$(PYTHON)",python3 python3.13 py
 	echo "exugear needs Python 3.11, 3.12 or 3.13; found: $$($(or $(PYTHON),python3) --version 2>&1)." >&2; \
 	echo "Install one, or specify it: make PYTHON=/path/to/python3.12 TARGET" >&2; exit 1
 
-.PHONY: test-browser help install demo demo-short test validate validate-long benchmarks check check-web vendor-web docs dist wheel-test wheel-test-all lock clean
+.PHONY: release-check test-browser help install demo demo-short test validate validate-long benchmarks check check-web vendor-web docs dist wheel-test wheel-test-all lock clean
 
 help:
 	@echo "make demo        GRC 750 from gear data to waterfalls, modes and a report, into $(RESULTS)"
@@ -102,6 +103,7 @@ help:
 	@echo "make dist        sdist and wheel into dist; PROJECT_URL=https://... makes links and pictures absolute"
 	@echo "make wheel-test  install and use the wheel with the Python of $(VENV)"
 	@echo "make wheel-test-all  the same with Python 3.11, 3.12 and 3.13, if found"
+	@echo "make release-check  list of what a release needs: versions, files, distributions, linters, dates"
 	@echo "make lock        update requirements.lock to current versions"
 	@echo "make clean       remove all generated files, results and $(VENV)"
 
@@ -184,6 +186,14 @@ wheel-test: dist
 
 wheel-test-all: dist
 	$(RUN)/python packaging/try_wheel.py dist/exugear-*.whl --all --constraint requirements.lock
+
+$(RELEASE_INSTALLED): $(DOCS_INSTALLED)
+	@$(PIP) install --constraint requirements.lock --editable ".[$(EXTRAS),docs,release]"
+	@touch $@
+
+# Without the linters, as where they cannot be installed: .venv/bin/python packaging/release_check.py
+release-check: $(RELEASE_INSTALLED)
+	$(RUN)/python packaging/release_check.py
 
 lock:
 	@python=$$($(FIND_PYTHON)) || exit 1; "$$python" -m venv --clear $(VENV)-lock

@@ -12,7 +12,7 @@ import yaml
 
 import exugear
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parent.parent.parent
 PLACEHOLDERS = "OWNER/exugear", "MAINTAINER@EXAMPLE.ORG"
 """What the owner of a public repository fills in; `exugear` is not published before."""
 
