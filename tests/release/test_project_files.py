@@ -60,7 +60,8 @@ def test_placeholders_are_where_a_release_looks_for_them() -> None:
     if not tracked:
         pytest.skip("this is no checkout")
     known = {"CITATION.cff", "codemeta.json", "CONTRIBUTING.md", "CODE_OF_CONDUCT.md", "SECURITY.md"}
-    texts = [name for name in tracked if name.endswith((".md", ".cff", ".json", ".yml", ".toml"))]
+    known |= {"docs/development/releasing.md", "packaging/conda/recipe.yaml"}
+    texts = [name for name in tracked if name.endswith((".md", ".cff", ".json", ".yml", ".yaml", ".toml"))]
     found = {name for name in texts if any(mark in _text(name) for mark in PLACEHOLDERS)}
     assert found == known & set(tracked)
 

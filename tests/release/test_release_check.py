@@ -13,10 +13,20 @@ from types import ModuleType
 import pytest
 
 ROOT = Path(__file__).parent.parent.parent
-FILES = (
-    "pyproject.toml CITATION.cff codemeta.json CHANGELOG.md README.md docs/development packaging "
-    ".github docs/validation/index.md benchmarks/results.json exugear/gearbox/versions.py fe_ste/tools/versions.py"
-).split()
+FILES = [
+    "pyproject.toml",
+    "CITATION.cff",
+    "codemeta.json",
+    "CHANGELOG.md",
+    "README.md",
+    "docs/development",
+    "packaging",
+    ".github",
+    "docs/validation/index.md",
+    "benchmarks/results.json",
+    "exugear/gearbox/versions.py",
+    "fe_ste/tools/versions.py",
+]
 
 
 @pytest.fixture(scope="module")
@@ -84,6 +94,21 @@ def test_a_change_that_contradicts_another_file_fails(
 def test_a_version_without_a_dated_section_fails(checks: ModuleType, tree: Path) -> None:
     changed(tree, "pyproject.toml", 'version = "0', 'version = "9')
     assert checks.changelog(tree).state == "FAIL"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="commands of a shell")
+def test_the_commands_of_the_page_on_releases_set_the_version_everywhere(checks: ModuleType, tree: Path) -> None:
+    page = (tree / "docs" / "development" / "releasing.md").read_text(encoding="utf-8")
+    commands = [line.strip() for line in page.splitlines() if line.startswith(("    VERSION=", "    sed -i "))]
+    assert len(commands) > 6
+    subprocess.run(["sh", "-e"], input="\n".join(commands), cwd=tree, text=True, check=True)
+    result = checks.same_version(tree)
+    assert result.state == "pass", result.details
+    assert result.text.startswith("0.4.0 of 20")
+    told = checks.changelog(tree)
+    assert told.state == "pass", "all entries of Unreleased stand under the version"
+    for check in (checks.known_versions, checks.recipes, checks.pythons):
+        assert check(tree).state == "pass"
 
 
 def test_what_the_owner_fills_in_is_listed_with_its_line_and_refuses_nothing(checks: ModuleType, tree: Path) -> None:
