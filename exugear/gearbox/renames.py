@@ -54,6 +54,7 @@ GEARBOX_RENAMES: tuple[Rename, ...] = (
     *_damping("mounts"),
     Rename("bodies.*", "wheels_z_mm", "gears_z_mm"),
     *(Rename("rating", f"least_{name}", f"minimum_{name}") for name in ("S_H", "S_F", "S_0", "dynamic_factor")),
+    Rename("rating.gears.*", "roughness_um", "roughness_Rz_um"),
 )
 STUDY_RENAMES: tuple[Rename, ...] = (
     Rename("", "figures", "outputs"),

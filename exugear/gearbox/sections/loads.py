@@ -171,15 +171,6 @@ class StrengthSection(Section):
     mean_stress_factor: q.StrengthFactor | None = None
     """Mean stress factor Y_M, required for gears with reversed tooth bending, such as planets and idler gears."""
 
-    @model_validator(mode="before")
-    @classmethod
-    def _renamed(cls, content: Any) -> Any:
-        if isinstance(content, dict) and "roughness_um" in content:
-            raise ValueError(
-                f"roughness_um = {content['roughness_um']}: renamed; set roughness_Rz_um, or roughness_Ra_um for Ra"
-            )
-        return content
-
     @model_validator(mode="after")
     def _roughness(self) -> StrengthSection:
         if (self.roughness_Rz_um is None) == (self.roughness_Ra_um is None):
