@@ -86,7 +86,16 @@ def read_stored_gearbox(folder: Path, permissions: Permissions = NOTHING_MORE) -
     # A file with a valid checksum may still be forged and have any content.
     except (FileError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise GearboxFileError(f"{path}: cannot be used ({error}); run exugear modes into this folder again") from error
-    return Gearbox.from_dict(content, source, permissions)
+    try:
+        return Gearbox.from_dict(content, source, permissions)
+    except GearboxFileError as error:
+        if not any(" was renamed to " in line for line in error.errors):
+            raise
+        # The file itself may have been migrated since: its results have not.
+        raise GearboxFileError(
+            f"{path}: written by an earlier version, whose keys have other names; run exugear migrate {source}, then "
+            f"exugear report {source}, which computes the results again"
+        ) from error
 
 
 def modes_path(folder: str | Path, choice: Choice) -> Path:

@@ -6,6 +6,9 @@ example of each key of that version.
 
 from __future__ import annotations
 
+import hashlib
+import json
+import shutil
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -83,3 +86,38 @@ def test_a_template_of_0_3_0_passes_the_checks_after_the_command(kind: str, tmp_
     assert command("migrate", file).exit_code == 0
     outcome = command("check", file)
     assert outcome.exit_code == 0, outcome.stderr
+
+
+def test_a_results_folder_of_0_3_0_names_both_commands_once(tmp_path: Path) -> None:
+    """Its copy of the gearbox file has the old names, whatever has become of the file since."""
+    stored = {"source": str(tmp_path / "my.toml"), "content": tomllib.loads(text_of("pair.toml"))}
+    text = json.dumps([stored["source"], stored["content"]], sort_keys=True)
+    checksum = hashlib.sha256(text.encode()).hexdigest()
+    (tmp_path / "case.json").write_text(json.dumps({**stored, "checksum": checksum}), encoding="utf-8")
+    outcome = command("report", tmp_path, "--stored")
+    assert outcome.exit_code == 2
+    told = " ".join(outcome.stderr.split())
+    assert "written by an earlier version, whose keys have other names; run exugear migrate" in told
+    assert told.count("case.json") == 1
+    assert not (tmp_path / "report.html").exists()
+
+
+@pytest.mark.validation
+def test_modes_of_0_3_0_are_named_and_computed_again(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """`parallel-modes.nc` is what `exugear modes` of 0.3.0 wrote for its template `parallel`."""
+    file = tmp_path / "my.toml"
+    file.write_text(migrated(text_of("parallel.toml"))[0], encoding="utf-8")
+    stored = tmp_path / "results" / "bushing" / "line_of_action-discs" / "modes.nc"
+    stored.parent.mkdir(parents=True)
+    shutil.copy(FILES / "parallel-modes.nc", stored)
+    outcome = command("modes", file, "--variant", "bushing", "--out", tmp_path / "results")
+    assert outcome.exit_code == 0
+    (told,) = (record.getMessage() for record in caplog.records if "modes.nc" in record.getMessage())
+    assert told.endswith(
+        "modes.nc: is not a file of eigenmodes: its attribute mesh_model is missing; it is computed again"
+    )
+    assert stored.read_bytes() != (FILES / "parallel-modes.nc").read_bytes()
+    caplog.clear()
+    again = command("modes", file, "--variant", "bushing", "--out", tmp_path / "results")
+    assert again.exit_code == 0
+    assert "modes.nc" not in caplog.text
