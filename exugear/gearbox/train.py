@@ -411,7 +411,7 @@ class Train(
                     raise self.error(
                         f"static_load.{key} = {name!r}: no such rotating body; bodies are {', '.join(self.spins)}"
                     )
-        if np.linalg.matrix_rank(self._modes_of(self.locked)) < len(self.locked):
+        if self.locked and np.linalg.matrix_rank(self._modes_of(self.locked)) < len(self.locked):
             raise self.error(
                 f"static_load.locked = {list(self.locked)}: more bodies than the degrees of freedom of the train ("
                 f"{self.degrees_of_freedom}), load sharing is undetermined; remove one"

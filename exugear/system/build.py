@@ -276,8 +276,9 @@ def _rolling_motions(gearbox: Gearbox, coordinates: Mapping[str, tuple[int, ...]
     """Motions of the spins (size, n) in which no mesh closes; couplings may twist."""
     rows = gearbox.train.spin_rows[: len(gearbox.meshes)]
     order = [coordinates[name][5] for name in gearbox.spinning]
-    motions = np.zeros((len(order), len(order) - np.linalg.matrix_rank(rows)))
-    motions[order] = scipy.linalg.null_space(rows / np.abs(rows).max(axis=1, keepdims=True))
+    free = scipy.linalg.null_space(rows / np.abs(rows).max(axis=1, keepdims=True))
+    motions = np.zeros((len(order), free.shape[1]))
+    motions[order] = free
     return motions
 
 

@@ -307,7 +307,7 @@ def test_an_extreme_load_counts_for_static_safety_alone(tmp_path, first, stresse
         (lambda content: content.update(lubricant=OIL), "viscosity_40_mm2_per_s: is set twice"),
         (
             lambda content: content["rating"]["gears"]["pinion"].update(roughness_um=4.8),
-            "roughness_um: was renamed to roughness_Rz_um; exugear migrate FILE.toml",
+            "roughness_um = 4.8: was renamed to roughness_Rz_um; exugear migrate FILE.toml",
         ),
         (
             lambda content: content["rating"]["gears"]["pinion"].update(roughness_Ra_um=0.8),
