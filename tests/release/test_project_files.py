@@ -13,7 +13,7 @@ import yaml
 import exugear
 
 ROOT = Path(__file__).parent.parent.parent
-PLACEHOLDERS = "OWNER/exugear", "MAINTAINER@EXAMPLE.ORG"
+PLACEHOLDERS = "OWNER/exugear", "MAINTAINER@EXAMPLE.ORG", "AUTHOR NAME", "DISCLOSURE BY OWNER"
 """What the owner of a public repository fills in; `exugear` is not published before."""
 
 
@@ -60,7 +60,7 @@ def test_placeholders_are_where_a_release_looks_for_them() -> None:
     if not tracked:
         pytest.skip("this is no checkout")
     known = {"CITATION.cff", "codemeta.json", "CONTRIBUTING.md", "CODE_OF_CONDUCT.md", "SECURITY.md"}
-    known |= {"docs/development/releasing.md", "packaging/conda/recipe.yaml"}
+    known |= {"docs/development/releasing.md", "paper/paper.md", "packaging/conda/recipe.yaml"}
     texts = [name for name in tracked if name.endswith((".md", ".cff", ".json", ".yml", ".yaml", ".toml"))]
     found = {name for name in texts if any(mark in _text(name) for mark in PLACEHOLDERS)}
     assert found == known & set(tracked)
