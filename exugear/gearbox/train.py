@@ -91,6 +91,11 @@ def mesh_row(spins: Sequence[str], mesh: MeshedBodies, pinion_share: float = 1.0
     return row
 
 
+def _rank(rows: Floats) -> int:
+    """Rank of a matrix that may be empty, which NumPy refuses before 2.4."""
+    return int(np.linalg.matrix_rank(rows)) if rows.size else 0
+
+
 def coupling_row(spins: Sequence[str], coupling: CoupledBodies) -> Floats:
     """Return the coupling twist per unit rotation, (spins,): 1 for its first body, -1 for its second."""
     return np.array([float(name == coupling.first) - float(name == coupling.second) for name in spins])
@@ -321,8 +326,8 @@ class Train(
         """Bodies with given speeds, and those stationary bodies whose speed the given ones leave undetermined."""
         chosen = list(speeds)
         for name in self._standing(chosen[0]):
-            rank = np.linalg.matrix_rank(self._modes_of(tuple(chosen)))
-            if np.linalg.matrix_rank(self._modes_of((*chosen, name))) > rank:
+            rank = _rank(self._modes_of(tuple(chosen)))
+            if _rank(self._modes_of((*chosen, name))) > rank:
                 chosen.append(name)
         return tuple(chosen)
 
@@ -411,7 +416,7 @@ class Train(
                     raise self.error(
                         f"static_load.{key} = {name!r}: no such rotating body; bodies are {', '.join(self.spins)}"
                     )
-        if self.locked and np.linalg.matrix_rank(self._modes_of(self.locked)) < len(self.locked):
+        if _rank(self._modes_of(self.locked)) < len(self.locked):
             raise self.error(
                 f"static_load.locked = {list(self.locked)}: more bodies than the degrees of freedom of the train ("
                 f"{self.degrees_of_freedom}), load sharing is undetermined; remove one"
