@@ -28,6 +28,7 @@ ORDER = (
     "turbine_loads",
     "rexs_file",
     "compare_designs",
+    "study",
 )
 """Order of the examples, from first steps to special topics."""
 
