@@ -388,7 +388,7 @@ def response_of(
         left_out=model.waves.left_out(model.usual_harmonics),
         change_with_more=math.nan if settings.branches else _change_with_more(solver, solved),
         band=band,
-        campbell=campbell_of(linear.system.frozen, tracks),
+        campbell=campbell_of(linear.system, tracks),
     )
 
 

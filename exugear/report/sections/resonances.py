@@ -379,6 +379,8 @@ PEAKS = 20
 """Number of peaks that are compared with run-ups, and listed of a continuation."""
 LEAST_SHARE, SHOWN_CONTRIBUTIONS = 0.05, 3
 """Minimum listed contribution to a resonance, and maximum number of contributions."""
+NOTICED_RANGE = 0.01
+"""Range of a natural frequency over the angle of the carrier, over it, from which it is drawn."""
 STRONG = 0.1
 """Fraction of the largest peak from which a crossing counts as strong."""
 TOO_FAST = "too fast"
@@ -519,6 +521,17 @@ def _campbell(material: ReportData, data: xr.Dataset, name: str, label: str) -> 
         Curve(f"{kind or OTHER_KIND}: mode {number}", speeds, frequency, "thin")
         for number, (kind, frequency) in enumerate(zip(diagram.kinds, diagram.frequency.T, strict=True), start=1)
     ]
+    for mode, bounds in enumerate(diagram.over_angle):
+        if bounds[1] - bounds[0] > NOTICED_RANGE:
+            curves += [
+                Curve(
+                    f"mode {mode + 1}, {word} over the carrier's angle",
+                    speeds,
+                    share * diagram.frequency[:, mode],
+                    "dashed",
+                )
+                for word, share in zip(("lowest", "highest"), bounds.tolist(), strict=True)
+            ]
     highest = float(np.nanmax(diagram.frequency, initial=1.0))
     for line in order_lines(material.context.gearbox, 1):
         ends = np.array([0.0, float(speeds.max())])
@@ -590,6 +603,9 @@ def _mode_rows(
             "fraction / %": "",
             "mode shape": material.words.labelled(diagram.names[mode]),
         }
+        if np.ptp(diagram.over_angle) > 0.0:
+            low, high = 100.0 * (diagram.over_angle[mode] - 1.0)
+            row["over the carrier's angle / %"] = f"{round(low, 2) + 0.0:.2f} to {high:+.2f}"
         if met is not None:
             line = line_name(tuple(int(n) for n in index[int(met["line"])]), bases)
             row["strongest crossing"] = f"{material.words.labelled(line)} at {abs(met['speed']) / RPM:.1f} rpm"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,8 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.steady.balance.neighbours import with_needed_neighbours
 from exugear.steady.balance.response import dissipated_and_given, parametric_response, signals
-from exugear.steady.mean_system.mean_system import mean_system, rotating_frame, unsuitable
+from exugear.steady.campbell import frequencies_over_angle, modes_over_speed
+from exugear.steady.mean_system.mean_system import MeanSystem, mean_modes, mean_system, rotating_frame, unsuitable
 from exugear.steady.mean_system.mesh_waves import mesh_waves
 from exugear.steady.mean_system.planet_sets import SteadyError, planet_sets
 from exugear.steady.mean_system.symmetric_carriers import symmetric_carrier
@@ -22,7 +24,7 @@ from exugear.system.build import elastic_arrays
 
 from ...optional_libraries import needs_meshio
 from ..cases.assembled import assembled
-from ..cases.ring import drum_content, ring_content
+from ..cases.ring import drum_content, ring_content, write_rim
 from ..cases.steady_runs import apart, solver_of
 
 pytestmark = needs_meshio
@@ -157,6 +159,42 @@ def test_lines_that_are_left_out_change_the_others_by_what_is_told(solver, respo
     at = solver.model.lines.find(few.lines.index[1:])[0]
     known = signals(solver.model, response)[at, 0]
     assert np.linalg.norm(found - known) < 1.01 * changed * np.linalg.norm(known)
+
+
+@pytest.mark.parametrize("place", [1, 2])
+def test_frequencies_at_an_angle_of_the_carrier_are_those_of_a_stage_built_at_it(grc, stiffness, tmp_path, place):
+    """An oval ring: a second gearbox file has its planets where those of the first arrive; its modes are at zero angle.
+
+    Stiffnesses of bearings are stated: those of catalogue bearings depend on the load, and so on the carrier's angle.
+    """
+    content = ring_content(grc, tmp_path)
+    write_rim(tmp_path / "rim.vtu", oval=0.03)
+    stated = {"radial_N_per_m": 2e9, "axial_N_per_m": 1e9, "tilt_N_m_per_rad": 1e7}
+    for bearing in content["bearings"].values():
+        bearing.pop("catalogue", None)
+        bearing["stiffness"] = stated
+
+    def built(turn: float) -> MeanSystem:
+        turned = copy.deepcopy(content)
+        planet = turned["bodies"]["planet"]
+        planet["planet_angles_deg"] = [angle + np.degrees(turn) for angle in planet["planet_angles_deg"]]
+        gearbox = Gearbox.from_dict(turned, str(tmp_path / "oval.toml"))
+        return mean_system(assembled(gearbox, Choice("flexible"), stiffness), np.array([1.0, 3.0]))
+
+    def frequencies(system: MeanSystem) -> np.ndarray:
+        return mean_modes(system, 2.0)[0].imag[:40] / (2.0 * np.pi)
+
+    system = built(0.0)
+    held = np.array([frequencies(one) for one in system.at_angles()])
+    np.testing.assert_allclose(held[0], frequencies(system.frozen), rtol=1e-9)
+    here = frequencies(built(float(system.frame.places[place])).frozen)
+    np.testing.assert_allclose(held[place], here, rtol=1e-3)
+    over_zero = held / held[0]
+    assert np.abs(over_zero[place] - 1.0).max() > 5e-3
+    tracks = modes_over_speed(system.frozen, 1.0, 3.0, held[0, -1])
+    over_angle = frequencies_over_angle(system, tracks)
+    assert over_angle[:, 0].min() == pytest.approx(over_zero.min(), rel=1e-9)
+    assert over_angle[:, 1].max() == pytest.approx(over_zero.max(), rel=1e-9)
 
 
 def test_a_stiff_ring_and_carrier_give_the_response_of_rigid_ones(grc, stiffness, folder):
