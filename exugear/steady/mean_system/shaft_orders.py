@@ -330,7 +330,7 @@ class _Series:
         return [(n, complex(x)) for n, x in enumerate(values) if abs(x) > LEAST * np.abs(values).max()]
 
     def _state(self, psi: float) -> Floats:
-        """Static coordinates at an angle of the input, rad; behind them those of a flexible ring gear at the planets."""
+        """Return static coordinates at an angle of the input (rad), behind them those of a flexible ring at planets."""
         q = self.frame.state(psi, self.speed, self.waves.system.static_at(self.speed))[0]
         return self.assembly.with_travelling(q, np.zeros_like(q))[0]
 

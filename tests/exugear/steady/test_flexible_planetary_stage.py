@@ -170,7 +170,6 @@ def excited(grc, stiffness, folder, changes, choice="flexible"):
 @pytest.mark.parametrize(
     ("kind", "most"),
     [
-        ("none", 1e-3),
         ("run-out of the sun", 1e-3),
         ("run-out of a planet", 2e-3),
         ("pitch of the ring", 8e-3),
@@ -212,7 +211,7 @@ def test_lines_that_are_left_out_change_the_others_by_what_is_told(solver, respo
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize("kind", SHAFT_EXCITATIONS)
+@pytest.mark.parametrize("kind", ["none", "run-out of a planet", "torque on the sun shaft"])
 def test_a_stiff_ring_and_carrier_give_the_response_of_rigid_ones(grc, stiffness, folder, kind):
     """Stiffness of bodies and mounts times 300: what is left is in proportion to their compliance.
 
@@ -238,7 +237,7 @@ def test_a_stiff_ring_and_carrier_give_the_response_of_rigid_ones(grc, stiffness
     assert apart < 1e-4 * sum(abs(value) ** 2 for value in known.values())
     if kind != "none":
         shaft = [order for order in known if order % 99.0 and abs(known[order]) > 1e-3 * max(map(abs, known.values()))]
-        assert shaft or kind == "run-out of the sun"  # a sun that floats gives way to its run-out
+        assert shaft
         for order in shaft:
             assert found[order] == pytest.approx(known[order], rel=0.03)
 
