@@ -101,8 +101,8 @@ class PassingPlanets:
         passing = np.zeros(index.shape[1], dtype=np.int64)
         passing[family.carrier] = step
         first = self._first_of_groups(family)
-        apart = 2 * int(np.abs(index[:, family.carrier]).max()) // step
-        rows = index[first, None, :] + np.arange(-apart, apart + 1)[:, None] * passing
+        reach = 2 * int(np.abs(index[:, family.carrier]).max()) // step
+        rows = index[first, None, :] + np.arange(-reach, reach + 1)[:, None] * passing
         places, mirrored = self._lines.find(rows)
         speed = self._frequencies[-1] / self._lines.orders[-1]
         frequencies = speed * (rows @ self._lines.bases)
@@ -118,8 +118,9 @@ class PassingPlanets:
         assert family.planets is not None
         lines = self._lines
         units = lines.index @ lines.units
-        turns = units[:, np.flatnonzero(lines.units[family.carrier])[0]].copy()
-        units[:, np.flatnonzero(lines.units[family.carrier])[0]] = 0
+        column = int(np.flatnonzero(lines.units[family.carrier])[0])
+        turns = units[:, column].copy()
+        units[:, column] = 0
         leading = units[np.arange(len(units)), np.argmax(units != 0, axis=1)]
         turns = np.where(leading < 0, -turns, turns) % family.planets.waves
         turns = np.where(leading == 0, np.minimum(turns, -turns % family.planets.waves), turns)
