@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from timing import Cost, timed
 
-from exugear.system.kernels.meshes import stiffness_at
+from exugear.system.kernels.cubics import stiffness_at
 from exugear.system.loads import LoadTable
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.element import MeshElement

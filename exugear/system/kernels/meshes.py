@@ -32,13 +32,13 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from exugear.system.kernels.coordinates import AXIAL, BODY_SIZE, PADDED, PADDED_SPIN, PADDED_TILT, SPIN, TILT
+from exugear.system.kernels.cubics import cubic, piece_of
 from exugear.system.kernels.table_law import (
     NOMINAL_DEFLECTION,
     NOMINAL_DISTANCE,
     NOMINAL_MISALIGNMENT,
     Scratch,
     TableArrays,
-    piece_at,
 )
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import compiled, kernel
@@ -127,56 +127,6 @@ class MeshArrays(NamedTuple):
         return MeshArrays(**others, table=table)
 
 
-def periodic_cubic(samples: Floats) -> Floats:
-    """Coefficients of a periodic C1 cubic through equally spaced samples over one cycle.
-
-    Slopes are central differences (Catmull and Rom 1974), so that a sample affects only its neighbourhood.
-
-    Parameters
-    ----------
-    samples : (n,) values at pmc = 0, 1/n, ...; one sample means a constant
-
-    Returns
-    -------
-    (n, 4) coefficients c of sum_j c_j t^j on each piece, t from 0 to 1
-
-    Examples
-    --------
-    >>> periodic_cubic(np.array([1.0, 2.0, 1.0, 0.0]))[0]
-    array([ 1.,  1.,  1., -1.])
-    """
-    values = np.asarray(samples, dtype=np.float64)
-    following = np.roll(values, -1)
-    slope = 0.5 * (following - np.roll(values, 1))
-    next_slope = np.roll(slope, -1)
-    rise = following - values
-    return np.stack([values, slope, 3.0 * rise - 2.0 * slope - next_slope, slope + next_slope - 2.0 * rise], axis=1)
-
-
-@kernel
-def piece_of(x: float, pieces: int) -> tuple[int, float]:
-    """Piece of a function of period 1 at any position x, and the place in it from 0 to 1."""
-    scaled = (x - math.floor(x)) * pieces
-    piece = piece_at(scaled, pieces)
-    return piece, scaled - piece
-
-
-@kernel
-def cubic_at(c: Floats, first: int, t: float) -> tuple[float, float, float]:
-    """Cubic with the four coefficients from `first` on, and its two derivatives by t."""
-    value: float = c[first] + t * (c[first + 1] + t * (c[first + 2] + t * c[first + 3]))
-    slope = c[first + 1] + t * (2.0 * c[first + 2] + t * 3.0 * c[first + 3])
-    return value, slope, 2.0 * c[first + 2] + 6.0 * t * c[first + 3]
-
-
-@kernel
-def stiffness_at(coefficients: Floats, pieces: int, pmc: float) -> tuple[float, float]:
-    """Return stiffness (N/m) and its slope per cycle at any position in the mesh cycle; coefficients (n, 4)."""
-    piece, t = piece_of(pmc, pieces)
-    value, slope, _ = cubic_at(coefficients[piece], 0, t)
-    return value, slope * pieces
-
-
 @kernel
 def frame_row(q: Floats, index: Integers, axis: Floats, row: Floats, gradient: Floats, turning: Floats) -> float:
     """Value of sum W . z for one mesh, with its gradient (13,) and the derivative of the gradient by psi (13,)."""
@@ -221,14 +171,15 @@ def frame_row(q: Floats, index: Integers, axis: Floats, row: Floats, gradient: F
 
 
 @kernel
-def error_at(m: int, end: int, angle: float, meshes: MeshArrays | Meshes) -> tuple[float, float, float]:
+def error_at(m: int, end: int, angle: float, meshes: MeshArrays) -> tuple[float, float, float]:
     """Deviation (m) of one gear of mesh m at its angle (rad) relative to the frame, with two derivatives by it."""
     pieces = meshes.error_pieces[m, end]
     if pieces == 0:
         return 0.0, 0.0, 0.0
     piece, t = piece_of(angle / (2.0 * math.pi), pieces)
     per_rad = pieces / (2.0 * math.pi)
-    value, slope, curvature = cubic_at(meshes.error[m, end, piece], 0, t)
+    c = meshes.error[m, end, piece]
+    value, slope, curvature = cubic(c[0], c[1], c[2], c[3], t)
     return value, slope * per_rad, curvature * per_rad * per_rad
 
 
@@ -265,14 +216,16 @@ def mesh_pmc(q: Floats, m: int, meshes: MeshArrays) -> float:
 
 
 @kernel
-def load_way(m: int, pmc: float, meshes: MeshArrays | Meshes) -> tuple[float, float, float, float]:
+def load_way(m: int, pmc: float, meshes: MeshArrays) -> tuple[float, float, float, float]:
     """Axial position w (m) of mesh m's load centroid and moment F0 (c - w) (N m), each with its slope per cycle."""
     pieces = meshes.way_pieces[m]
     if pieces == 0:
         return 0.0, 0.0, 0.0, 0.0
     piece, t = piece_of(pmc, pieces)
-    way, moving, _ = cubic_at(meshes.way[m, piece], 0, t)
-    moment, changing, _ = cubic_at(meshes.way[m, piece], MOMENT_BEYOND, t)
+    c = meshes.way[m, piece]
+    way, moving, _ = cubic(c[0], c[1], c[2], c[3], t)
+    c = c[MOMENT_BEYOND:]
+    moment, changing, _ = cubic(c[0], c[1], c[2], c[3], t)
     return way, moving * pieces, moment, changing * pieces
 
 
@@ -407,9 +360,9 @@ DEFLECTION_ROW, FORCE_ROW, FRICTION_ROW = range(3)
 """Rows of `Meshes.rows`; those of friction are the last three."""
 FIXED, ALONG_COSINE, ALONG_SINE, SECOND = range(0, 4 * PADDED, PADDED)
 """First columns of the parts of each row, and first column of the second gear."""
-TILT_SHIFT, TILT_ROW_X, TILT_ROW_Y = range(4, 7)
-"""Columns of `Meshes.tilt` behind those that it shares with `MeshArrays.tilt`: misalignment at zero tilts relative to
-that of the contact state (rad), and its row over the tilts of gear 1, whose negative is that of gear 2."""
+MISALIGNED, TILT_ROW_X, TILT_ROW_Y = range(3)
+"""Columns of `Meshes.misalignment`: at zero tilts relative to that of the contact state (rad), and its row over the
+tilts of gear 1, whose negative is that of gear 2."""
 PADDED_FRAME = 2 * PADDED
 """Index of the frame's angle in a gradient of `MeshMemory.gradients`, after two padded gears."""
 KINETIC, ELASTIC, OF_LOADS, DISSIPATED, OF_VARYING_STIFFNESS, NON_CONSERVATIVE, OF_FRICTION, OF_BEARING_RATES = range(8)
@@ -422,26 +375,21 @@ derivative of their displacement.
 
 
 class Meshes(NamedTuple):
-    """Meshes as in `MeshArrays`; missing coordinates refer to one that remains zero."""
+    """Meshes in a loop over time: `MeshArrays`, and what the loop reads instead of their coordinates and rows."""
 
+    arrays: MeshArrays
     coordinates: Integers
-    """(m, 13) index of each local coordinate in the state."""
+    """(m, 13) index of each local coordinate in the state; missing ones refer to one that remains zero."""
     slot: Integers
     """(m,) index of the cosine and sine of the frame's angle among those of all frame angles."""
     axis: Floats
     """(m, 2, 2) as in `MeshArrays`; zero for gears without translations."""
-    form: Integers
-    deflection: Floats
-    force: Floats
     conjugate: Integers
     """(m,) 1 if the force row is the deflection row."""
     tilting: Integers
     """(m,) 1 for row-based models that resist misalignment."""
-    tilt: Floats
-    """(m, 7) columns as named in this module."""
-    way_pieces: Integers
-    way: Floats
-    """Pieces and coefficients of the shuttling, as in `MeshArrays`."""
+    misalignment: Floats
+    """(m, 3) misalignment and its row, columns as named in this module."""
     spinning: Integers
     """(m,) 1 for gears with rotations only."""
     ends: Integers
@@ -452,20 +400,8 @@ class Meshes(NamedTuple):
     """
     offsets: Floats
     """(m, 5, 3) contributions of cos psi, sin psi and psi itself to the value of each row."""
-    cycles: Floats
-    phase: Floats
-    pieces: Integers
-    stiffness: Floats
-    damping: Floats
     mean: Floats
     """(m, 2) stiffness (N/m) and damping (N s/m) at the static load, averaged over the cycle."""
-    line_of_action: Floats
-    error_pieces: Integers
-    error: Floats
-    friction_pieces: Integers
-    friction: Floats
-    friction_rows: Floats
-    friction_speed: Floats
     nominal: Floats
     """(m,) deflection of gears in their nominal position, m."""
     table: TableArrays | None
@@ -596,7 +532,7 @@ def tilt_motion(
 
     The gradient is by both tilts of gear 1, with the opposite sign for gear 2, and by the frame's angle.
     """
-    row = meshes.tilt[m]
+    row = meshes.misalignment[m]
     first = places[meshes.ends[m, 0]]
     second = places[meshes.ends[m, 1]]
     x = c * row[TILT_ROW_X] - s * row[TILT_ROW_Y]
@@ -606,7 +542,7 @@ def tilt_motion(
     turning = x * b - y * a
     a_rate = first[PADDED + PADDED_TILT] - second[PADDED + PADDED_TILT]
     b_rate = first[PADDED + PADDED_TILT + 1] - second[PADDED + PADDED_TILT + 1]
-    return row[TILT_SHIFT] + x * a + y * b, x * a_rate + y * b_rate + turning * psi_rate, x, y, turning
+    return row[MISALIGNED] + x * a + y * b, x * a_rate + y * b_rate + turning * psi_rate, x, y, turning
 
 
 @kernel
@@ -664,10 +600,10 @@ def subtract_errors(
     rate = 0.0
     index = meshes.coordinates[m]
     for end in range(2):
-        if meshes.error_pieces[m, end] > 0:
+        if meshes.arrays.error_pieces[m, end] > 0:
             spin = index[BODY_SIZE * end + SPIN]
             psi = index[FRAME]
-            error, slope, _ = error_at(m, end, q[spin] - q[psi], meshes)
+            error, slope, _ = error_at(m, end, q[spin] - q[psi], meshes.arrays)
             # A flank below its nominal position closes the gap later; for the other flank the sign is opposite (side
             # -1).
             delta -= side * error

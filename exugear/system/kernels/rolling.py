@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from exugear.system.kernels.cubics import cubic
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.bundles import cached_bundle
 from fe_ste.tools.compilation import kernel, summing_kernel
@@ -143,16 +144,6 @@ def slices_law(r: int, d: float, w: float, rolling: RollingArrays) -> tuple[floa
 
 
 @summing_kernel
-def cubic(patch: Floats, n: int, y: float) -> tuple[float, float, float]:
-    """Cubic of every fourth coefficient from the n-th on, at the share y of a step, and its two derivatives."""
-    a = patch[n]
-    b = patch[n + 4]
-    c = patch[n + 8]
-    d = patch[n + 12]
-    return ((d * y + c) * y + b) * y + a, (3.0 * d * y + 2.0 * c) * y + b, 6.0 * d * y + 2.0 * c
-
-
-@summing_kernel
 def first_contact(r: int, d: float, tilt: float, rolling: RollingArrays) -> tuple[float, int, float]:
     """Depth (m) of an element whose normal stays behind its first contact, not above zero where it is apart.
 
@@ -204,10 +195,10 @@ def contact_law(
     at = layout[TABLE] + STRIP_SIZE * layout[STRIPS] + PATCH_SIZE * (i * layout[STRIPS] + j)
     patch = rolling.tables[at : at + PATCH_SIZE]
     # Coefficients along the root at this tilt, and their derivatives by the tilt; then along the root.
-    v0, w0, b0 = cubic(patch, 0, y)
-    v1, w1, b1 = cubic(patch, 1, y)
-    v2, w2, b2 = cubic(patch, 2, y)
-    v3, w3, b3 = cubic(patch, 3, y)
+    v0, w0, b0 = cubic(patch[0], patch[4], patch[8], patch[12], y)
+    v1, w1, b1 = cubic(patch[1], patch[5], patch[9], patch[13], y)
+    v2, w2, b2 = cubic(patch[2], patch[6], patch[10], patch[14], y)
+    v3, w3, b3 = cubic(patch[3], patch[7], patch[11], patch[15], y)
     v = ((v3 * x + v2) * x + v1) * x + v0
     vx = ((3.0 * v3 * x + 2.0 * v2) * x + v1) * per_root
     vxx = (6.0 * v3 * x + 2.0 * v2) * per_root * per_root

@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from exugear.system.kernels.cubics import piece_at
 from fe_ste.tools.arrays import Booleans, Floats, Integers
 from fe_ste.tools.compilation import compiled, kernel
 from fe_ste.tools.octets import all_eight, eight, put
@@ -122,19 +123,6 @@ def scratch_memory() -> Scratch:
         np.zeros((9, NODE_SIZE)),
         np.zeros(LAW_SIZE),
     )
-
-
-@kernel
-def piece_at(scaled: float, pieces: int) -> int:
-    """Find the piece that holds a number in [0, pieces]; one of them for any number, also one that is not finite.
-
-    A state that diverges passes through angles that are no numbers, or that no integer can hold: what the processor
-    makes of these would read outside the array. Clamping the integer costs nothing; clamping the number, 4 % of a step.
-    """
-    piece = int(scaled)
-    if piece >= pieces:
-        return pieces - 1
-    return max(0, piece)
 
 
 @kernel

@@ -38,7 +38,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Body, Mesh, node_position, seat_key
 from exugear.gearbox.sections.entries import GROUND
 from exugear.system.kernels.coordinates import BODY_SIZE
-from exugear.system.kernels.meshes import periodic_cubic
+from exugear.system.kernels.cubics import periodic_cubic
 from exugear.system.tooth_mesh.contact_state import MeshContactState, changed_over_cycle, even_contact
 from exugear.system.tooth_mesh.placement import (
     MeshError,

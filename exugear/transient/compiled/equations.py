@@ -365,14 +365,14 @@ def add_rolling(
 
 
 @kernel
-def hand_to_body(frame: Floats, turned: bool, sign: float, sums: Floats, moment: int, load: Floats) -> None:
-    """Add a force, and the moment at an entry of sums, both in a body's axes, to a load in global axes."""
+def hand_to_body(frame: Floats, turned: bool, sign: float, sums: Floats, moment: Floats, load: Floats) -> None:
+    """Add the force at the head of sums and a moment, both in a body's axes, to a load in global axes."""
     x = sign * sums[0]
     y = sign * sums[1]
     z = sign * sums[2]
-    a = sign * sums[moment]
-    b = sign * sums[moment + 1]
-    c = sign * sums[moment + 2]
+    a = sign * moment[0]
+    b = sign * moment[1]
+    c = sign * moment[2]
     if turned:
         x, y, z = (
             frame[0] * x + frame[1] * y + frame[2] * z,
@@ -435,9 +435,10 @@ def add_connectors(q: Floats, bodies: Bodies, connectors: Connectors, pairs: Pai
             sums[6] += mx + (by * fz - bz * fy)
             sums[7] += my + (bz * fx - bx * fz)
             sums[8] += mz + (bx * fy - by * fx)
-        if i != ground:
-            hand_to_body(work.frames[i], True, 1.0, sums, 3, work.loads[i])
-        hand_to_body(work.frames[i], i != ground, -1.0, sums, 6, work.loads[j])
+        turned = i != ground
+        if turned:
+            hand_to_body(work.frames[i], turned, 1.0, sums, sums[3:6], work.loads[i])
+        hand_to_body(work.frames[i], turned, -1.0, sums, sums[6:9], work.loads[j])
 
 
 # Equations of motion as one compiled piece that allocates nothing

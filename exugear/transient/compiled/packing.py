@@ -400,45 +400,23 @@ def _meshes(numbers: _Numbers, ends: Integers) -> Meshes:
     table = given.table
     both = np.stack([given.deflection, given.force], axis=1)
     rows, offsets = padded_rows(np.concatenate([both, given.friction_rows], axis=1), axis)
+    shift = table.nominal[:, NOMINAL_MISALIGNMENT] - given.tilt[:, TILT_REST]
     return Meshes(
+        arrays=given,
         coordinates=np.where(given.coordinates < 0, numbers.size, given.coordinates),
         slot=np.array([numbers.slot(int(c)) for c in given.coordinates[:, FRAME]], dtype=np.int64),
         axis=axis,
-        form=given.form,
-        deflection=given.deflection,
-        force=given.force,
         conjugate=np.all(given.deflection == given.force, axis=1).astype(np.int64),
         tilting=(given.tilt[:, TILT_STIFFNESS] > 0.0).astype(np.int64),
-        tilt=_tilts(given),
-        way_pieces=given.way_pieces,
-        way=given.way,
+        misalignment=np.column_stack([shift, table.misalignment[:, TILT : TILT + 2]]),
         spinning=spinning_alone(given).astype(np.int64),
         ends=ends,
         rows=rows,
         offsets=offsets,
-        cycles=given.cycles,
-        phase=given.phase,
-        pieces=given.pieces,
-        stiffness=given.stiffness,
-        damping=given.damping,
         mean=np.array([(e.tangent.mean(), e.damping) for e in elements]).reshape(-1, 2),
-        line_of_action=given.line_of_action,
-        error_pieces=given.error_pieces,
-        error=given.error,
-        friction_pieces=given.friction_pieces,
-        friction=given.friction,
-        friction_rows=given.friction_rows,
-        friction_speed=given.friction_speed,
         nominal=table.nominal[:, NOMINAL_DEFLECTION].copy(),
         table=table if (given.form == TABLE_FORM).any() else None,
     )
-
-
-def _tilts(given: MeshArrays) -> Floats:
-    """How meshes resist misalignment, (m, 7): `Meshes.tilt`."""
-    rows = given.table.misalignment[:, TILT : TILT + 2]
-    shift = given.table.nominal[:, NOMINAL_MISALIGNMENT] - given.tilt[:, TILT_REST]
-    return np.column_stack([given.tilt[:, :TILT_REST], shift, rows])
 
 
 def _joints(numbers: _Numbers) -> Joints | None:

@@ -106,7 +106,7 @@ def observe_meshes(meshes: Meshes, work: Work, columns: Columns, sample: Floats,
         energy[OF_VARYING_STIFFNESS] += state[CYCLE_POWER]
         energy[NON_CONSERVATIVE] += state[OTHER_POWER]
         energy[OF_FRICTION] += state[FRICTION_POWER]
-        if meshes.form[m] == TABLE_FORM:
+        if meshes.arrays.form[m] == TABLE_FORM:
             sample[columns.outside_table + m] = state[OUTSIDE]
             sample[columns.centre_distance_change + m] = state[CENTRE_CHANGE]
             sample[columns.misalignment + m] = state[MISALIGNMENT]
@@ -226,11 +226,11 @@ def observe_connectors(
 @kernel
 def acting_row(m: int, meshes: Meshes, table: TableArrays | None, work: Work) -> tuple[float, Floats]:
     """Scalar force of mesh m (N) and the row that it acts along."""
-    force = work.mesh.states[m, FORCE] / meshes.line_of_action[m]
-    row = meshes.force[m]
+    force = work.mesh.states[m, FORCE] / meshes.arrays.line_of_action[m]
+    row = meshes.arrays.force[m]
     if table is None:
         return force, row
-    if force < 0.0 and meshes.form[m] == TABLE_FORM:  # the other flank pushes
+    if force < 0.0 and meshes.arrays.form[m] == TABLE_FORM:  # the other flank pushes
         return -force, table.back[m]
     return force, row
 
@@ -259,8 +259,8 @@ def observe_joints(
                 force, row = acting_row(m, meshes, table, work)
                 across = work.mesh.states[m, FRICTION]
                 along_x = BODY_SIZE * end
-                x = force * row[along_x] + across * meshes.friction_rows[m, 0, along_x]
-                y = force * row[along_x + 1] + across * meshes.friction_rows[m, 0, along_x + 1]
+                x = force * row[along_x] + across * meshes.arrays.friction_rows[m, 0, along_x]
+                y = force * row[along_x + 1] + across * meshes.arrays.friction_rows[m, 0, along_x + 1]
                 forces[3 * j] += c * x - s * y
                 forces[3 * j + 1] += s * x + c * y
                 forces[3 * j + 2] += force * row[along_x + AXIAL]

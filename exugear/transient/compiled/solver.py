@@ -114,12 +114,12 @@ def correct_spinning_meshes(step: float, method: Method, past: StepHistory, mesh
         index = meshes.coordinates[m]
         state = work.mesh.states[m]
         frame = corrected_by(index[FRAME], past, work)
-        change = meshes.deflection[m, SPIN_1] * (corrected_by(index[SPIN_1], past, work) - frame)
-        change += meshes.deflection[m, SPIN_2] * (corrected_by(index[SPIN_2], past, work) - frame)
+        change = meshes.arrays.deflection[m, SPIN_1] * (corrected_by(index[SPIN_1], past, work) - frame)
+        change += meshes.arrays.deflection[m, SPIN_2] * (corrected_by(index[SPIN_2], past, work) - frame)
         state[DEFLECTION] += of_q * change
         if state[FORCE] != 0.0:  # teeth that are apart stay so
             force = (meshes.mean[m, 0] * of_q + meshes.mean[m, 1] * of_v) * change
-            state[FORCE] += force * meshes.line_of_action[m]
+            state[FORCE] += force * meshes.arrays.line_of_action[m]
 
 
 @kernel

@@ -25,7 +25,7 @@ from exugear.gearbox.load_cases import summarise_loads
 from exugear.report.writer import write_report
 from exugear.results.run_file import invalidity_of, load_run
 from exugear.system.build import assemble
-from exugear.system.kernels.table_law import piece_at
+from exugear.system.kernels.cubics import piece_at
 from exugear.system.signals import BALANCE_TERMS, MESH_TIMES
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.transient.compiled.integrator import highest_rate

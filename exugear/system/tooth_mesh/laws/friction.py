@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 
 from exugear.system.kernels.coordinates import COSINE, SINE
+from exugear.system.kernels.cubics import cubic, piece_of
 from exugear.system.kernels.meshes import (
     DEFLECTION_ROW,
     FORCE,
@@ -28,10 +29,8 @@ from exugear.system.kernels.meshes import (
     MeshArrays,
     Meshes,
     MeshWork,
-    cubic_at,
     frame_row,
     mesh_pmc,
-    piece_of,
     push_apart,
     relative_spin,
     row_dot,
@@ -50,7 +49,8 @@ SLOW_SLIDING = 1e-3
 def friction_part(part: int, coefficients: Floats, pieces: int, pmc: float) -> float:
     """One of the force and moments per unit mesh force at a position in the mesh cycle; coefficients (p, 12)."""
     piece, t = piece_of(pmc, pieces)
-    return cubic_at(coefficients[piece], 4 * part, t)[0]
+    c = coefficients[piece, 4 * part :]
+    return cubic(c[0], c[1], c[2], c[3], t)[0]
 
 
 @kernel
@@ -92,30 +92,30 @@ def add_friction(
 @kernel
 def add_friction_loads(q: Floats, v: Floats, m: int, meshes: Meshes, work: MeshWork) -> None:
     """Add the friction of mesh m, whose force was evaluated before, to the loads of a loop over time."""
-    if meshes.friction_pieces[m] == 0:
+    if meshes.arrays.friction_pieces[m] == 0:
         return
     index = meshes.coordinates[m]
     state = work.mesh.states[m]
     i = index[SPIN_1]
     j = index[SPIN_2]
     k = index[FRAME]
-    size = friction_size(state[FORCE], v[i] - v[j], meshes.friction_speed[m])
-    pmc = meshes.phase[m] + meshes.cycles[m] * (q[i] - q[k])
-    state[FRICTION] = size * friction_part(0, meshes.friction[m], meshes.friction_pieces[m], pmc)
+    size = friction_size(state[FORCE], v[i] - v[j], meshes.arrays.friction_speed[m])
+    pmc = meshes.arrays.phase[m] + meshes.arrays.cycles[m] * (q[i] - q[k])
+    state[FRICTION] = size * friction_part(0, meshes.arrays.friction[m], meshes.arrays.friction_pieces[m], pmc)
     state[FRICTION_POWER] = 0.0
     gradient = work.mesh.gradients[DEFLECTION_ROW]
     c = work.turns[meshes.slot[m], COSINE]
     s = work.turns[meshes.slot[m], SINE]
     for part in range(FRICTION_PARTS):
-        force = size * friction_part(part, meshes.friction[m], meshes.friction_pieces[m], pmc)
+        force = size * friction_part(part, meshes.arrays.friction[m], meshes.arrays.friction_pieces[m], pmc)
         if meshes.spinning[m] == 1:
-            torque_1 = force * meshes.friction_rows[m, part, SPIN_1]
-            torque_2 = force * meshes.friction_rows[m, part, SPIN_2]
+            torque_1 = force * meshes.arrays.friction_rows[m, part, SPIN_1]
+            torque_2 = force * meshes.arrays.friction_rows[m, part, SPIN_2]
             work.force[i] += torque_1
             work.force[j] += torque_2
             work.force[k] -= torque_1 + torque_2
-            rate = meshes.friction_rows[m, part, SPIN_1] * (v[i] - v[k])
-            rate += meshes.friction_rows[m, part, SPIN_2] * (v[j] - v[k])
+            rate = meshes.arrays.friction_rows[m, part, SPIN_1] * (v[i] - v[k])
+            rate += meshes.arrays.friction_rows[m, part, SPIN_2] * (v[j] - v[k])
         else:
             _, rate = row_motion(m, FRICTION_ROW + part, q[k], v[k], c, s, meshes, work.places, gradient)
             push_apart(m, -force, gradient, meshes, work)

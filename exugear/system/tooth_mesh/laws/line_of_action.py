@@ -21,7 +21,7 @@ import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Mesh
-from exugear.system.kernels.meshes import cubic_at, periodic_cubic, piece_of, stiffness_at
+from exugear.system.kernels.cubics import cubic, periodic_cubic, piece_of, stiffness_at
 from exugear.system.tooth_mesh.element import Law, MeshCurve, MeshData
 from exugear.system.tooth_mesh.placement import MeshError
 from exugear.system.tooth_mesh.tables import fitting_table, table_path, wanted_table
@@ -120,8 +120,9 @@ def curve_law(
     """Do as `stiffness_law` for the curve of coefficients (n, 9)."""
     piece, t = piece_of(pmc, pieces)
     c = coefficients[piece]
-    k, k_slope, _ = cubic_at(c, 0, t)
-    n, n_slope, _ = cubic_at(c, EXPONENT, t)
+    k, k_slope, _ = cubic(c[0], c[1], c[2], c[3], t)
+    e = c[EXPONENT:]
+    n, n_slope, _ = cubic(e[0], e[1], e[2], e[3], t)
     force, tangent, force_by_pmc, energy, energy_by_pmc = curve_of(
         k, k_slope * pieces, n, n_slope * pieces, c[PER_LOAD], delta
     )

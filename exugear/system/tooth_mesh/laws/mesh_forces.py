@@ -114,7 +114,7 @@ def row_flank(
     tilt_rate: float,
     pmc: float,
     cycling: float,
-    meshes: MeshArrays | Meshes,
+    meshes: MeshArrays,
 ) -> tuple[float, float, float, float, float, float, float, float, float]:
     """Law along a row of mesh m with damper, resistance to misalignment and shuttling, by its readings and their rates.
 
@@ -336,8 +336,8 @@ def mesh_state(q: Floats, v: Floats, meshes: MeshArrays, out: Floats) -> None:
 def spinning_motion(q: Floats, v: Floats, m: int, meshes: Meshes) -> tuple[float, float, float]:
     """Deflection of mesh m of gears that only spin, without errors; its rate, and the rate along the force row."""
     index = meshes.coordinates[m]
-    lever_1 = meshes.deflection[m, SPIN_1]
-    lever_2 = meshes.deflection[m, SPIN_2]
+    lever_1 = meshes.arrays.deflection[m, SPIN_1]
+    lever_2 = meshes.arrays.deflection[m, SPIN_2]
     i = index[SPIN_1]
     j = index[SPIN_2]
     k = index[FRAME]
@@ -345,8 +345,8 @@ def spinning_motion(q: Floats, v: Floats, m: int, meshes: Meshes) -> tuple[float
     rate = lever_1 * (v[i] - v[k]) + lever_2 * (v[j] - v[k])
     if meshes.conjugate[m] == 1:
         return delta, rate, rate
-    lever_1 = meshes.force[m, SPIN_1]
-    lever_2 = meshes.force[m, SPIN_2]
+    lever_1 = meshes.arrays.force[m, SPIN_1]
+    lever_2 = meshes.arrays.force[m, SPIN_2]
     return delta, rate, lever_1 * (v[i] - v[k]) + lever_2 * (v[j] - v[k])
 
 
@@ -354,8 +354,8 @@ def spinning_motion(q: Floats, v: Floats, m: int, meshes: Meshes) -> tuple[float
 def mesh_cycle(q: Floats, v: Floats, m: int, meshes: Meshes) -> tuple[float, float]:
     """Position in the mesh cycle of mesh m, unwrapped, and its rate, 1/s."""
     index = meshes.coordinates[m]
-    pmc = meshes.phase[m] + meshes.cycles[m] * (q[index[SPIN_1]] - q[index[FRAME]])
-    return pmc, meshes.cycles[m] * (v[index[SPIN_1]] - v[index[FRAME]])
+    pmc = meshes.arrays.phase[m] + meshes.arrays.cycles[m] * (q[index[SPIN_1]] - q[index[FRAME]])
+    return pmc, meshes.arrays.cycles[m] * (v[index[SPIN_1]] - v[index[FRAME]])
 
 
 @kernel
@@ -364,7 +364,7 @@ def elastic_mesh_force(
 ) -> tuple[float, float, float, float, float]:
     """Elastic force of mesh m at a deflection (m), of a law along a row; results as of `row_law`."""
     pmc, cycling = mesh_cycle(q, v, m, meshes)
-    return row_law(meshes.form[m], meshes.stiffness[m], meshes.pieces[m], delta, pmc, cycling)
+    return row_law(meshes.arrays.form[m], meshes.arrays.stiffness[m], meshes.arrays.pieces[m], delta, pmc, cycling)
 
 
 @kernel
@@ -374,9 +374,9 @@ def add_spinning_mesh(q: Floats, v: Floats, m: int, meshes: Meshes, work: MeshWo
     state = work.mesh.states[m]
     delta, rate, acting = spinning_motion(q, v, m, meshes)
     elastic, _, _, energy, cycle_power = elastic_mesh_force(q, v, m, delta, meshes)
-    force = elastic + meshes.damping[m] * rate
-    torque_1 = force * meshes.force[m, SPIN_1]
-    torque_2 = force * meshes.force[m, SPIN_2]
+    force = elastic + meshes.arrays.damping[m] * rate
+    torque_1 = force * meshes.arrays.force[m, SPIN_1]
+    torque_2 = force * meshes.arrays.force[m, SPIN_2]
     work.force[index[SPIN_1]] -= torque_1
     work.force[index[SPIN_2]] -= torque_2
     # The frame that carries the gears takes what they leave.
@@ -398,8 +398,8 @@ def keep_state(
 ) -> None:
     """Leave what a mesh with a law along a row does: see `exugear.system.kernels.meshes`."""
     state[DEFLECTION], state[RATE], state[OUTSIDE] = delta, rate, 0.0
-    state[FORCE] = force * meshes.line_of_action[m]
-    state[ENERGY], state[DAMPED_POWER] = energy, meshes.damping[m] * rate * rate
+    state[FORCE] = force * meshes.arrays.line_of_action[m]
+    state[ENERGY], state[DAMPED_POWER] = energy, meshes.arrays.damping[m] * rate * rate
     state[CYCLE_POWER], state[OTHER_POWER] = cycle_power, force * (acting - rate)
 
 
@@ -412,7 +412,7 @@ def add_row_mesh(q: Floats, v: Floats, m: int, meshes: Meshes, work: MeshWork) -
     psi_rate = v[index[FRAME]]
     c = work.turns[meshes.slot[m], COSINE]
     s = work.turns[meshes.slot[m], SINE]
-    clean = meshes.error_pieces[m, 0] + meshes.error_pieces[m, 1] == 0
+    clean = meshes.arrays.error_pieces[m, 0] + meshes.arrays.error_pieces[m, 1] == 0
     delta, rate = row_motion(m, DEFLECTION_ROW, psi, psi_rate, c, s, meshes, work.places, gradient)
     delta += meshes.nominal[m]
     if not clean:
@@ -429,7 +429,7 @@ def add_row_mesh(q: Floats, v: Floats, m: int, meshes: Meshes, work: MeshWork) -
         add_tilting_mesh(q, v, m, delta, rate, c, s, meshes, work)
         return
     elastic, _, _, energy, cycle_power = elastic_mesh_force(q, v, m, delta, meshes)
-    force = elastic + meshes.damping[m] * rate
+    force = elastic + meshes.arrays.damping[m] * rate
     push_apart(m, force, gradient, meshes, work)
     keep_state(m, delta, rate, acting, force, energy, cycle_power, meshes, work.mesh.states[m])
 
@@ -444,7 +444,7 @@ def add_tilting_mesh(
     tilt, tilt_rate, x, y, turning = tilt_motion(m, v[frame], c, s, meshes, work.places)
     pmc, cycling = mesh_cycle(q, v, m, meshes)
     force, moment, energy, lost, cycle_power, _, _, _, _ = row_flank(
-        m, delta, rate, tilt, tilt_rate, pmc, cycling, meshes
+        m, delta, rate, tilt, tilt_rate, pmc, cycling, meshes.arrays
     )
     push_apart(m, force, work.mesh.gradients[DEFLECTION_ROW], meshes, work)
     first = work.loads[meshes.ends[m, 0]]
@@ -462,9 +462,9 @@ def add_tilting_mesh(
 def add_meshes(q: Floats, v: Floats, meshes: Meshes, work: MeshWork) -> None:
     """Add the forces of all meshes to `work.loads` and `work.force`; leave what they do in `work.mesh.states`."""
     for m in range(meshes.coordinates.shape[0]):
-        if meshes.form[m] == TABLE_FORM:
+        if meshes.arrays.form[m] == TABLE_FORM:
             add_table_mesh(q, v, m, meshes, meshes.table, work.mesh.law, work)
-        elif meshes.spinning[m] == 1 and meshes.error_pieces[m, 0] + meshes.error_pieces[m, 1] == 0:
+        elif meshes.spinning[m] == 1 and meshes.arrays.error_pieces[m, 0] + meshes.arrays.error_pieces[m, 1] == 0:
             add_spinning_mesh(q, v, m, meshes, work)
         else:
             add_row_mesh(q, v, m, meshes, work)

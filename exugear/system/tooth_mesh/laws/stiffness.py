@@ -10,6 +10,7 @@ import numpy as np
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import seat_key
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN, TILT
+from exugear.system.kernels.cubics import periodic_cubic
 from exugear.system.kernels.meshes import (
     FRAME,
     ROW_SIZE,
@@ -17,7 +18,6 @@ from exugear.system.kernels.meshes import (
     TILT_STIFFNESS,
     WAY_COLUMNS,
     MeshArrays,
-    periodic_cubic,
 )
 from exugear.system.kernels.table_law import NOMINAL_DEFLECTION
 from exugear.system.tooth_mesh.element import MeshCurve, MeshElement

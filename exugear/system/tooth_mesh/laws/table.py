@@ -308,11 +308,11 @@ def fast_flank_force(
     gradient, total = memory.gradient[ALONG_DEFLECTION], memory.gradient[TABLE_FORCE]
     deflection = table.nominal[m, NOMINAL_DEFLECTION]
     if side > 0:
-        row, misalignment_row, offset = meshes.deflection[m], table.misalignment[m], deflection
-        phase, cycles, number = meshes.phase[m], meshes.cycles[m], 0
+        row, misalignment_row, offset = meshes.arrays.deflection[m], table.misalignment[m], deflection
+        phase, cycles, number = meshes.arrays.phase[m], meshes.arrays.cycles[m], 0
     else:
         row, misalignment_row, offset = table.back[m], table.back_misalignment[m], -deflection - table.backlash[m]
-        phase, cycles, number = table.back_phase[m], -meshes.cycles[m], 1
+        phase, cycles, number = table.back_phase[m], -meshes.arrays.cycles[m], 1
     delta, rate = mesh_row(q, v, index, axis, row, c, s, gradient)
     less, slower = subtract_errors(q, v, m, float(side), meshes, gradient, BODY_SIZE, SPIN, FRAME)
     delta, rate = delta + offset + less, rate + slower

@@ -10,7 +10,8 @@ import pytest
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.system.build import assemble
-from exugear.system.kernels.meshes import ENERGY, STATE_SIZE, periodic_cubic, stiffness_at
+from exugear.system.kernels.cubics import periodic_cubic, stiffness_at
+from exugear.system.kernels.meshes import ENERGY, STATE_SIZE
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.element import mesh_elements
 from exugear.system.tooth_mesh.laws.mesh_forces import add_mesh_forces, mesh_state

@@ -10,7 +10,7 @@ import pytest
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.system.build import assemble
-from exugear.system.kernels.meshes import periodic_cubic
+from exugear.system.kernels.cubics import periodic_cubic
 from exugear.system.tooth_mesh.element import MeshCurve
 from exugear.system.tooth_mesh.laws.line_of_action import (
     CURVE_FORM,
