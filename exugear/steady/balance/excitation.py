@@ -72,7 +72,10 @@ from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
 SAMPLES_PER_HARMONIC = 16
 """Minimum samples per mesh period over the harmonics, with contact loss: kinks need more than products of orders."""
 SHAFT_NEIGHBOURS = 3
-"""Multiples of the planet passing frequency by which a flexible ring gear couples orders of shafts to others."""
+"""Multiples of the planet passing frequency by which a flexible ring gear couples orders of shafts to others.
+
+Half as many as of the meshes' orders: there are many of them. In the planetary stage of the GRC they change by 1e-6 at
+most with twice as many."""
 MOST_LINES = 500
 """Combinations up to which lines are looked for: those up to the eighth of three mesh frequencies, the 21st of two."""
 

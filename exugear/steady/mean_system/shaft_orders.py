@@ -11,7 +11,10 @@ too. The averaged system itself has no deviations. A stated load on a body, such
 one.
 
 Meshes of planets are waves around the carrier (`exugear.steady.mean_system.mesh_waves`), so that a deviation of order n
-against the carrier appears at n plus and minus multiples of the carrier's rotation. So does a load on one planet.
+against the carrier appears at n plus and minus multiples of the carrier's rotation. So does a load on one planet. A
+flexible ring gear has more waves than planets; as many waves as planets give any deviation at these, and their forces
+couple to all waves as those of deflections do. Where the carrier's rotation is a base of its own, as it is there, order
+n = h z + r of a gear with z teeth is its part r beside the cycle h of the mesh, whose phase it keeps.
 """
 
 from __future__ import annotations
