@@ -41,7 +41,7 @@ from exugear.report.findings.margins import (
 )
 from exugear.report.findings.proposals import ASSUMPTION, DesignChange, alignment_change, propose_changes
 from exugear.report.findings.ranking import Resonance, ranking_of
-from exugear.report.findings.words import QUANTITIES, excitations_at
+from exugear.report.findings.words import QUANTITIES, excitations_at, rounded_text
 from exugear.results.folder import DESIGN_CHANGES_FILE, bodies_folder
 from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.settings import SteadySettings
@@ -67,6 +67,8 @@ STATIC = "static load"
 """Load by default."""
 MOST_LOAD = 3.0
 """Largest load over the static load."""
+TOLERANCE_UM = 2.0
+"""Tolerance of tip relief for which the transmission error is computed, too; grinding keeps a few micrometres."""
 NOT_RATED = "its life cannot be computed (`exugear life`)"
 _REFUSALS = (GearboxFileError, GeometryError, BearingError, BalanceError, MeshError, SteadyError)
 """Errors that say that a change cannot be made."""
@@ -114,6 +116,9 @@ class ComputedProject(Protocol):
 
     def life(self) -> xr.Dataset:
         """Rate gears and bearings under the load spectrum."""
+
+    def stiffness(self) -> object:
+        """Compute missing transmission error tables of the mesh model."""
 
     def tables_at_work(self) -> dict[str, MeshTable]:
         """Return the transmission error tables that the mesh model reads."""
@@ -185,6 +190,8 @@ def study_design_changes(
             remedy = ""
             # The rating takes as long as the response: only a change that is worth it is rated.
             worth = not objection and change.group != ASSUMPTION
+            if worth:
+                costs.append(relief_tolerance(project, change))
             if rated is not None and (worth or change.requirement):
                 changed = _margins(_project_with(project, gearbox, change.name))
                 failed = [NOT_RATED] if changed is None else _failures(rated, changed)
@@ -251,6 +258,33 @@ def _alignments(project: ComputedProject, families: Collection[str]) -> list[Des
         for family in sorted(families)
     )
     return [change for change in found if change is not None]
+
+
+def relief_tolerance(project: ComputedProject, change: DesignChange) -> str:
+    """Say what `TOLERANCE_UM` less and more tip relief than a change states does to the static transmission error.
+
+    Tables at both limits are computed. Changes of no tip relief, and pairs without a table, have no text.
+    """
+    reliefs = {key: value for key, value in change.keys.items() if key.endswith(".tip_relief_um") and value > 0.0}
+    if not reliefs:
+        return ""
+    errors = []
+    for off, name in ((0.0, ""), (-TOLERANCE_UM, "-less-by-tolerance"), (TOLERANCE_UM, "-more-by-tolerance")):
+        limits = {key: max(value + off, 0.0) for key, value in reliefs.items()}
+        varied = _project_with(project, project.gearbox.varied({**change.keys, **limits}), f"{change.name}{name}")
+        varied.stiffness()
+        found = varied.tables_at_work()
+        errors.append({pair: 1e6 * float(np.ptp(own.static_state["ste"].to_numpy())) for pair, own in found.items()})
+    changed = {key.split(".")[1] for key in reliefs}
+    texts = []
+    for pair, section in project.gearbox.case.pairs.items():
+        if changed & {section.pinion, section.gear} and all(pair in swings for swings in errors):
+            stated, less, more = (rounded_text(swings[pair]) for swings in errors)
+            texts.append(
+                f"static transmission error of {pair} {stated} µm peak-to-peak; with {TOLERANCE_UM:g} µm less tip "
+                f"relief {less} µm, with {TOLERANCE_UM:g} µm more {more} µm"
+            )
+    return "; ".join(texts)
 
 
 def _changed_gearbox(project: ComputedProject, change: DesignChange) -> Gearbox:

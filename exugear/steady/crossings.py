@@ -11,6 +11,7 @@ negative.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -24,7 +25,7 @@ from exugear.steady.balance.response import mean_deviation_forces, transmission_
 from exugear.steady.campbell import ModeTracks
 from exugear.steady.harmonics.branches import NEIGHBOURS, predicted_tops, standing_peaks
 from exugear.steady.mean_system.mean_system import MeanSystem, mean_modes
-from exugear.steady.mean_system.mesh_places import DEFLECTION
+from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT
 from exugear.steady.mean_system.signals import Quantity
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, SingleComplexes
 from fe_ste.tools.threads import side_by_side
@@ -46,6 +47,11 @@ GAIN = 1e-3
 """Relative excess of a maximum over its peak at the known speeds from which it is evaluated."""
 APART = 0.25
 """Share of the distance between a peak's neighbours within which two maxima are evaluated together."""
+DRAWN = 10
+"""Highest peaks of each quantity in the range of operation whose flanks are resolved for drawings."""
+FLANK = (0.6, 1.2)
+"""Places of two points on a flank, over the distance at which a resonance falls to 1 / sqrt(2) of its top: they are at
+86 % and 64 % of it."""
 ROUNDS = 4
 """Iterations to a mode at the speed where a line meets it; their error is squared each time."""
 COINCIDE = 1e-6
@@ -212,6 +218,73 @@ def missed_tops(
     return np.sort(np.array(tops))
 
 
+def missed_flanks(
+    speeds: Floats,
+    amplitude: SingleComplexes,
+    smooth: Booleans,
+    quantities: Sequence[Quantity],
+    operation: tuple[float, float] | None,
+) -> Floats:
+    """Return speeds beside the highest peaks that are drawn as triangles: with fewer than two points above half height.
+
+    Parameters are those of `missed_tops`.
+
+    Notes
+    -----
+    Near the top A of a resonance the amplitude at a distance d is A / sqrt(1 + (d / w)^2). The first point below A / 2
+    on a flank gives w. Other modes may add to that point, and w is too large; the next call then comes closer.
+    """
+    inside = np.ones(len(speeds), dtype=bool)
+    if operation is not None:
+        within = (np.abs(speeds) >= operation[0]) & (np.abs(speeds) <= operation[1])
+        inside = within if within.any() else inside
+    more: list[float] = []
+    for quantity in quantities:
+        sizes = quantity.sizes(amplitude[:, 1:]).max(axis=2)
+        peaks = [
+            (int(point), line)
+            for line, amplitudes in enumerate(sizes.T)
+            for point in standing_peaks(amplitudes)
+            if inside[point]
+        ]
+        peaks.sort(key=lambda peak: -sizes[peak])
+        for point, line in peaks[:DRAWN]:
+            if smooth[_around(point, len(speeds))].all():
+                for side in (slice(point, None), slice(point, None, -1)):
+                    more += _on_flank(speeds[side], sizes[side, line])
+    taken = list(speeds)
+    for speed in sorted(more):
+        if np.abs(np.array(taken) - speed).min() > COINCIDE * abs(speed):
+            taken.append(speed)
+    return np.array(taken[len(speeds) :])
+
+
+def _on_flank(speeds: Floats, amplitude: Floats) -> list[float]:
+    """Return the speeds that a flank lacks; it begins at its peak.
+
+    Examples
+    --------
+    A peak of 1 that falls to 1 / sqrt(2) at 100.1; the flank has no point above half height, and then one:
+
+    >>> def resonance(speeds):
+    ...     return 1.0 / np.hypot(1.0, (speeds - 100.0) / 0.1)
+    >>> coarse, better = np.array([100.0, 101.0, 102.0]), np.array([100.0, 100.06, 101.0])
+    >>> np.round(_on_flank(coarse, resonance(coarse)), 3).tolist()
+    [100.06, 100.12]
+    >>> np.round(_on_flank(better, resonance(better)), 3).tolist()
+    [100.12]
+    """
+    below = np.flatnonzero(amplitude < 0.5 * amplitude[0])
+    if not below.size or below[0] > len(FLANK) or amplitude[below[0]] <= 0.0:
+        return []
+    first = int(below[0])
+    width = (speeds[first] - speeds[0]) / math.sqrt((amplitude[0] / amplitude[first]) ** 2 - 1.0)
+    wanted = [float(speeds[0] + share * width) for share in FLANK]
+    # Of two points, the one that is further from a known one is new.
+    known = speeds[1:first]
+    return sorted(wanted, key=lambda own: -float(np.abs(known - own).min(initial=np.inf)))[: len(FLANK) - len(known)]
+
+
 def _around(point: int, count: int) -> slice:
     """Return the places of a point and its neighbours, among so many."""
     return slice(max(point - NEIGHBOURS, 0), min(point + NEIGHBOURS + 1, count))
@@ -311,6 +384,8 @@ class Contributions:
     """Peak amplitude of the line at the level `linear`, m."""
     meshes: Mapping[str, float]
     """Share by family of meshes, and by stated torque."""
+    shuttling: Mapping[str, float]
+    """Part of the share of a family that is due to the moment of the load that shuttles along the face."""
     modes: tuple[tuple[float, float], ...]
     """Frequency (Hz) and share of each mode that carries a hundredth or more, the strongest first."""
     supports: Mapping[str, float]
@@ -337,15 +412,19 @@ def contributions(model: HarmonicBalanceModel, speed: float, line: int) -> Contr
     motion = np.linalg.solve(dynamic, loads).astype(np.complex128)
     total = complex(row @ motion)
     meshes: dict[str, float] = {}
-    parts = (adjoint @ forces).reshape(len(model.waves.waves), model.ports_at(speed).forces.shape[1]).sum(axis=1)
-    for wave, part in zip(model.waves.waves, parts, strict=True):
-        meshes[wave.family] = meshes.get(wave.family, 0.0) + _share(complex(part), total)
+    shuttling: dict[str, float] = {}
+    parts = (adjoint @ forces).reshape(len(model.waves.waves), model.ports_at(speed).forces.shape[1])
+    for wave, by_force in zip(model.waves.waves, parts, strict=True):
+        meshes[wave.family] = meshes.get(wave.family, 0.0) + _share(complex(by_force.sum()), total)
+        if model.shuttles:
+            moment = _share(complex(by_force[MISALIGNMENT]), total)
+            shuttling[wave.family] = shuttling.get(wave.family, 0.0) + moment
     for source in dict.fromkeys(filter(None, model.shaft_orders.source)):
         if part := complex(2.0 * adjoint @ model.shaft_loads(speed, source)[line]):
             meshes[source] = meshes.get(source, 0.0) + _share(part, total)
     supports, bodies = _derivatives(model.system, frequency, adjoint, motion, total)
     modes = _modes(model, speed, frequency, loads, row, total)
-    return Contributions(speed, abs(total), meshes, modes, supports, bodies)
+    return Contributions(speed, abs(total), meshes, shuttling, modes, supports, bodies)
 
 
 def loudest_near(model: HarmonicBalanceModel, speed: float, width: float, line: int) -> float:

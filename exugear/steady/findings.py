@@ -72,13 +72,24 @@ class SpeedCaveats:
         name = max(ratios, key=lambda bearing: ratios[bearing], default="")
         found = []
         if name and ratios[name] >= STRAINED:
-            text = f"dynamic load of {name} {100.0 * ratios[name]:.0f} % of its static load: outside the linear range, "
+            text = f"dynamic load of {name} {_percent(ratios[name])} of its static load: outside the linear range, "
             found.append(f"{text}too high")
         for mesh, fraction in self.tensile.items():
             if fraction[point] > 0.0:
                 text = f"tensile force of {mesh} for {100.0 * float(fraction[point]):.2g} % of the time: invalid, "
                 found.append(f"{text}because contact loss is neglected")
         return tuple(found)
+
+
+def _percent(ratio: float) -> str:
+    """Return a ratio of loads in percent; a static load that is next to nothing gives no meaningful number.
+
+    Examples
+    --------
+    >>> _percent(1.2), _percent(1777.0)
+    ('120 %', 'over 1000 %')
+    """
+    return f"{100.0 * ratio:.0f} %" if ratio <= 10.0 else "over 1000 %"
 
 
 def speed_caveats(data: xr.Dataset) -> SpeedCaveats:
@@ -170,7 +181,7 @@ def _models(data: xr.Dataset) -> Iterator[Finding]:
         text = f"nonlinear bearings are linearised at the static load; {_in_time(data)} evaluates the nonlinear model"
         yield Finding("note", text)
     if swings := bearing_swings(data):
-        loads = [f"{own.bearing} {100.0 * own.share:.0f} % at {_rpm(own.speed)}" for own in swings[:SHOWN_BEARINGS]]
+        loads = [f"{own.bearing} {_percent(own.share)} at {_rpm(own.speed)}" for own in swings[:SHOWN_BEARINGS]]
         more = f"; and {len(swings) - SHOWN_BEARINGS} more" if len(swings) > SHOWN_BEARINGS else ""
         text = (
             f"dynamic load of bearings over {100.0 * STRAINED:.0f} % of their static load ({'; '.join(loads)}{more}): "

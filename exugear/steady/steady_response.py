@@ -27,6 +27,7 @@ from exugear.steady.crossings import (
     contributions,
     crossings,
     loudest_near,
+    missed_flanks,
     missed_tops,
     with_crossings,
 )
@@ -283,7 +284,7 @@ CHECKED, MORE = 10, 1.5
 PEAKS_WITH_CONTRIBUTIONS = 20
 """Crossings whose peaks are taken apart."""
 ROUNDS = 5
-"""Times that tops are looked for between speeds, at most."""
+"""Times that tops, and then speeds on flanks, are looked for between speeds, at most."""
 SLOWEST_BRANCH = 0.01
 """Share of the fastest speed at which a branch from standstill begins."""
 LONGEST_WARNING = 300
@@ -408,23 +409,25 @@ def _with_tops(
 ) -> SolvedPoints:
     """Solve at speeds where neighbours indicate peaks higher than at any known speed, until none remain.
 
-    Each such state starts independently of others, so that a resumed computation gives the same results.
+    Then speeds are added on flanks of the highest peaks that have too few for a drawing. Each such state starts
+    independently of others, so that a resumed computation gives the same results.
     """
     tops: KnownTops = {}
-    for _ in range(ROUNDS):
-        is_solved = np.flatnonzero(np.isfinite(points.drive_torque))
-        order = is_solved[np.argsort(points.speed[is_solved], kind="stable")]
-        smooth = np.asarray(~(points.apart.any(axis=1) | points.free.any(axis=1)))[order]
-        quantities = solver.model.quantities
-        more = missed_tops(points.speed[order], points.amplitude[order], smooth, quantities, operation, tops)
-        if not more.size:
-            break
-        count = len(points.speed)
-        points = points.joined_with(_empty(solver.model, more))
-        solve(points, count, lambda: PointSolver(solver.linear, solver.method))
-        # A speed that was not requested and has no steady state is dropped without a warning.
-        kept = (np.arange(len(points.speed)) < count) | np.isfinite(points.drive_torque)
-        points = points if kept.all() else points.part(kept)
+    quantities = solver.model.quantities
+    for missed in (partial(missed_tops, known=tops), missed_flanks):
+        for _ in range(ROUNDS):
+            is_solved = np.flatnonzero(np.isfinite(points.drive_torque))
+            order = is_solved[np.argsort(points.speed[is_solved], kind="stable")]
+            smooth = np.asarray(~(points.apart.any(axis=1) | points.free.any(axis=1)))[order]
+            more = missed(points.speed[order], points.amplitude[order], smooth, quantities, operation)
+            if not more.size:
+                break
+            count = len(points.speed)
+            points = points.joined_with(_empty(solver.model, more))
+            solve(points, count, lambda: PointSolver(solver.linear, solver.method))
+            # A speed that was not requested and has no steady state is dropped without a warning.
+            kept = (np.arange(len(points.speed)) < count) | np.isfinite(points.drive_torque)
+            points = points if kept.all() else points.part(kept)
     return points
 
 

@@ -103,7 +103,7 @@ class MeanContact(ReprMixin):
 
     def _line(self) -> str:
         low, high = 1e6 * self.misalignment
-        return f": {self.force:.5g} N, misalignment {low:.4g} to {high:.4g} urad"
+        return f": {self.force:.5g} N, misalignment {low:.4g} to {high:.4g} µrad"
 
     @property
     def tilt_stiffness(self) -> float:

@@ -130,7 +130,7 @@ class StateAxes(ReprMixin):
             "position in the mesh cycle": f"{self.positions} positions",
             "torque": value_range(self.torque, "N m"),
             "centre distance": value_range(self.centre_distance, "mm", 1e3),
-            "misalignment": value_range(self.misalignment, "urad", 1e6),
+            "misalignment": value_range(self.misalignment, "µrad", 1e6),
         }
 
 
@@ -266,7 +266,7 @@ class StateResults(ReprMixin):
             distance = compliance.pair.centre_distance
             self.failures.append(
                 f"pmc {pmc:.3f}, torque {torque:g} N m, centre distance {1e3 * distance:.7g} mm, "
-                f"misalignment {1e6 * misalignment:.4g} urad: {state}"
+                f"misalignment {1e6 * misalignment:.4g} µrad: {state}"
             )
             return
         cosine = math.cos(compliance.pair.pinion.base_helix_angle)

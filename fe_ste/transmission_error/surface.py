@@ -464,14 +464,14 @@ class SteSurface(ReprMixin):
     def _line(self) -> str:
         return (
             f": {len(self.coefficients)} positions, {value_range(self.centre_distance, 'mm', 1e3)}, "
-            f"{value_range(self.misalignment, 'urad', 1e6)}, force up to {self.root_force[-1] ** 2:.5g} N"
+            f"{value_range(self.misalignment, 'µrad', 1e6)}, force up to {self.root_force[-1] ** 2:.5g} N"
         )
 
     def _table(self) -> TitledRows:
         return "surface of the static transmission error", {
             "position in the mesh cycle": f"{len(self.coefficients)} positions",
             "centre distance": value_range(self.centre_distance, "mm", 1e3),
-            "misalignment": value_range(self.misalignment, "urad", 1e6),
+            "misalignment": value_range(self.misalignment, "µrad", 1e6),
             "line-of-action force": value_range(self.root_force**2, "N"),
         }
 

@@ -210,18 +210,29 @@ class MeshTable(ReprMixin):
         TableError
             If an axis has several values and not this one.
         """
-        chosen = self.dataset
-        for axis in ("torque", "centre_distance", "misalignment"):
-            values = chosen[axis].to_numpy()
-            wanted = float(chosen.attrs.get(f"static_{axis}", math.nan))
+        places = self._static_places()
+        for axis, place in places.items():
+            if place is None:
+                raise TableError(
+                    f"table of {self.dataset.attrs['pair']}: no {axis} of the static state among its values"
+                )
+        return self.dataset.isel(places)
+
+    def _static_places(self) -> dict[str, int | None]:
+        """Return the place of the static state along each axis; None where the axis has several values and not it."""
+        places: dict[str, int | None] = {}
+        for axis in STATE_AXES:
+            values = self.dataset[axis].to_numpy()
+            wanted = float(self.dataset.attrs.get(f"static_{axis}", math.nan))
             at = np.flatnonzero(values == wanted) if len(values) > 1 else np.array([0])
-            if not len(at):
-                raise TableError(f"table of {chosen.attrs['pair']}: no {axis} of the static state among its values")
-            chosen = chosen.isel({axis: int(at[0])})
-        return chosen
+            places[axis] = int(at[0]) if len(at) else None
+        return places
 
     def plot(self, kind: Literal["ste", "stiffness", "load_share", "contact"] = "ste", ax: Axes | None = None) -> Axes:
         """Draw a quantity at the static state.
+
+        Where an axis of the table has several values and not that of the static state, the value nearest to their mean
+        is drawn, and the title states it.
 
         Parameters
         ----------
@@ -233,8 +244,6 @@ class MeshTable(ReprMixin):
 
         Raises
         ------
-        TableError
-            As in `static_state`.
         ValueError
             There is no such kind.
 
@@ -248,7 +257,22 @@ class MeshTable(ReprMixin):
         >>> table.plot("stiffness").get_ylabel()
         'Mesh stiffness / (N/µm)'
         """
-        return draw_table(self.static_state, kind, ax)
+        places = self._static_places()
+        chosen = {axis: self._middle(axis) if place is None else place for axis, place in places.items()}
+        state = self.dataset.isel(chosen)
+        panel = draw_table(state, kind, ax)
+        values = StateAxes(state.sizes["pmc"], *(np.atleast_1d(state[axis].to_numpy()) for axis in STATE_AXES)).ranges()
+        stated = [
+            f"{axis} {values[axis]}" for name in places if places[name] is None and (axis := name.replace("_", " "))
+        ]
+        if stated:
+            panel.set_title(", ".join(stated))
+        return panel
+
+    def _middle(self, axis: str) -> int:
+        """Return the place of the value nearest to the mean of an axis."""
+        values = self.dataset[axis].to_numpy()
+        return int(np.argmin(np.abs(values - values.mean())))
 
     @property
     def failures(self) -> list[str]:

@@ -47,7 +47,7 @@ def new(
         print_json({"case": str(case), "kind": kind.value})
         return
     say(f"{KINDS[kind.value]}. Next:")
-    for line in (f"check {case}", f"run {case}", f"report {default_folder(case)}"):
+    for line in (f"check {case}", f"steady {case}", f"report {default_folder(case)}"):
         say(f"  exugear {line}")
     say(f"Written: {case}")
 

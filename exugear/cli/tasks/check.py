@@ -268,7 +268,7 @@ PAIR_DETAILS = (
 LOAD_LEGEND = "*: the speed of a body is prescribed (driven_body). "
 REVERSED_LEGEND = "!: the flank opposite to the flank loaded by the static load."
 BEARING_LEGEND = (
-    "Axial load: of the shaft on the inner ring, positive along +z. Stiffness: radial; range: with the "
+    "Axial load: of the shaft on the inner ring, positive along +z. Stiffness range: with the "
     "estimated (not specified) inputs at their limits; dominant estimate: the input with the largest effect."
 )
 STATED_LEGEND = " *: specified in the gearbox file, used for the stiffness; static react.: static balance."
@@ -373,8 +373,8 @@ BEARINGS = (
     Column("radial\nload kN", _radial_load),
     Column("static\nreact. kN", _reaction),
     Column("axial\nload kN", "axial_load_kN", lambda load: significant(round(load, 3), 3, 2)),
-    Column("stiffness\nGN/m", "radial_stiffness_N_per_m", partial(significant, digits=3, decimals=5), 1e-9),
-    Column("range\nGN/m", _stiffness_range),
+    Column("radial\nstiffness\nGN/m", "radial_stiffness_N_per_m", partial(significant, digits=3, decimals=5), 1e-9),
+    Column("stiffness\nrange\nGN/m", _stiffness_range),
     Column("dominant\nestimate", _dominant_estimate, is_text=True),
 )
 

@@ -82,8 +82,8 @@ FLANKS = (
 ROOTS = (
     _flank("root"),
     _column("σ_F\nMPa", "root_stress", ".0f", 1e-6),
-    _column("nominal\nMPa", "nominal_root", ".0f", 1e-6),
-    _column("minimum\nMPa", "compression", ".0f", 1e-6),
+    _column("nominal\nstress MPa", "nominal_root", ".0f", 1e-6),
+    _column("minimum\nstress MPa", "compression", ".0f", 1e-6),
     _column("fatigue\ndamage", "root_damage", _damage),
     _column("S_F", "root_safety", ".2f"),
     _column("S_F\nISO", "standard_root_safety", ".2f"),
@@ -91,13 +91,13 @@ ROOTS = (
 )
 BEARINGS = (
     Column("bearing", "bearing"),
-    _column("largest\nkN", "largest_load", partial(significant, digits=3), 1e-3),
-    _column("equiv.\nkN", "equivalent", partial(significant, digits=3), 1e-3),
+    _column("largest\nload kN", "largest_load", partial(significant, digits=3), 1e-3),
+    _column("equiv.\nload kN", "equivalent", partial(significant, digits=3), 1e-3),
     _column("L10\nh", "basic_hours", life_text),
     _column("L10r\nh", "reference_hours", life_text),
     _column("L10m\nh", "modified_hours", life_text),
     _column("kappa", "viscosity_ratio", ".2g"),
-    _column("stress\nMPa", "pressure", ".0f", 1e-6),
+    _column("contact\nstress MPa", "pressure", ".0f", 1e-6),
     _column("S_0", "static_safety", ".2f"),
 )
 MODES = {

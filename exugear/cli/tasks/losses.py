@@ -167,7 +167,7 @@ PARTS = (
     _column("P/C", "load_ratio", ".2g"),
     _column("speed\nrpm", "speed_rpm", partial(significant, digits=3)),
     Column("loss\nkW", "loss_W", _kilowatts),
-    _column("band\nkW", "loss_band_W", _band),
+    _column("loss\nband kW", "loss_band_W", _band),
     _detail("H_V", _loss_factor),
     _detail("µ_m", "friction", ".3f"),
     _detail("P\nkN", "equivalent_load_N", partial(significant, digits=3), 1e-3),

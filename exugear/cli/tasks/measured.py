@@ -173,16 +173,16 @@ PEAKS = (
     Column("speed\nrpm", _speed, ".0f"),
     Column("measured", _amplitude("measured_amplitude")),
     Column("computed", _amplitude("computed_amplitude")),
-    Column("level\ndB", "difference_dB", "+.1f"),
-    Column("speed\n%", _seen),
-    detail("computed\nrpm", "computed_speed_rpm", ".1f"),
+    Column("level dif-\nference dB", "difference_dB", "+.1f"),
+    Column("speed dif-\nference %", _seen),
+    detail("computed\nspeed rpm", "computed_speed_rpm", ".1f"),
 )
 CHANNELS = (
     Column("channel", "channel"),
     Column("quantity", lambda row: row["quantity"].replace("_", " "), is_text=True),
     Column("place", "where", is_text=True),
     Column("levels\ndB rms", "deviation_dB", ".2f"),
-    Column("median\ndB", "offset_dB", "+.2f"),
+    Column("median dif-\nference dB", "offset_dB", "+.2f"),
 )
 ORDERS = (
     Column("order", "name"),

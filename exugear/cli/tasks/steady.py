@@ -19,6 +19,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import load_in_words, other_load_warning, static_load_in_words, summarise_loads
 from exugear.gearbox.units import RPM
 from exugear.project import Project
+from exugear.report.findings.context import METHOD_LABELS
 from exugear.report.findings.ranking import Ranking, ranking_of
 from exugear.results.findings import Finding
 from exugear.results.sound.over_speed import sound_over_speed
@@ -108,7 +109,9 @@ def steady(project: WatchedProject, settings: SteadySettings, quantity: str | No
         further=[sound_line(sound)] if sound else [],
         summary=summary,
         tables=[
-            resonance_table(gearbox, ranking, f"{summary['variant']}, {summary['method']}"),
+            resonance_table(
+                gearbox, ranking, f"{summary['variant']}, constant speed, {METHOD_LABELS[settings.method]}"
+            ),
             *filter(None, [source_table(gearbox, data)]),
             *(sound_tables(sound) if sound else ()),
         ],

@@ -280,6 +280,10 @@ def _cause_box(material: ReportData, headline: Headline, top: Resonance, known: 
             size = rounded_text(1e3 * own.amplitude)
             moving = f"load moves by ±{size} mm along the face; its moment excites tilting gears, "
             moving += f"{rounded_text(own.over_error)} times as strongly as the transmission error"
+            families = {mesh.family for mesh in context.gearbox.meshes if mesh.pair.name == first.pair}
+            parts = [known.shuttling[name] for name in families if name in known.shuttling] if known else []
+            if parts:
+                moving += f"; its part of the amplitude: {100.0 * sum(parts):.0f} %".replace("-", "−")
             facts.append(("Shuttling", moving))
     overlap = f"{rounded_text(first.overlap)}"
     if first.overlap == 0.0:

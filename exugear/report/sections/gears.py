@@ -185,7 +185,7 @@ def _contact_row(material: ReportData, own: PairContact) -> dict[str, object]:
             "uneven" if factor > UNEVEN else "even", factor, tag="mind" if factor > UNEVEN else ""
         ),
         "highest pressure at": place_on_flank(own, *own.actual.highest[1:], labels),
-        "tip edge pressure / MPa": replace(_rounded(1e-6 * edge), caveat=OF_CELLS) if edge > 0.0 else Cell("–"),
+        "tip edge pressure / MPa": edge_cell(edge, own.actual.highest[0]),
         "highest tip edge pressure at": edge_in_words(own, labels),
     }
     if material.ratings.sheet is not None:
@@ -195,6 +195,13 @@ def _contact_row(material: ReportData, own: PairContact) -> dict[str, object]:
             value = factors.get(name, math.nan)
             row[name] = Cell("–" if math.isnan(value) else f"{value:.2f}", value, tag="mind" if value < least else "")
     return row
+
+
+def edge_cell(edge: float, on_flank: float) -> Cell:
+    """Return the cell of a tip edge pressure (Pa), marked if it exceeds the highest pressure on the flank."""
+    if edge <= 0.0:
+        return Cell("–")
+    return replace(_rounded(1e-6 * edge), tag="mind" if edge > on_flank else "", caveat=OF_CELLS)
 
 
 def _rounded(value: float) -> Cell:

@@ -491,12 +491,20 @@ def _contributions_table(material: ReportData, data: xr.Dataset, name: str) -> T
                 "order": labelled(line_name(tuple(int(n) for n in index[line]), bases)),
                 "speed / rpm": f"{speed / RPM:.2f}",
                 "excited by": labelled(_shares(peak["meshes"].items())),
+                "of this, moment of the shuttling load": labelled(_shares(peak.get("shuttling", {}).items())) or "–",
                 "responding modes": _shares((f"{frequency:.1f} Hz", share) for frequency, share in peak["modes"]),
                 "sensitivity to stiffness of": labelled(_slopes_of(peak["supports"])),
                 "sensitivity to inertia of": labelled(_slopes_of(peak["bodies"])),
             }
         )
-    texts = ("order", "excited by", "responding modes", "sensitivity to stiffness of", "sensitivity to inertia of")
+    texts = (
+        "order",
+        "excited by",
+        "of this, moment of the shuttling load",
+        "responding modes",
+        "sensitivity to stiffness of",
+        "sensitivity to inertia of",
+    )
     return Table(rows, texts, caption="Contributions to resonances", name=name)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import re
 from collections.abc import Iterator
@@ -11,7 +12,9 @@ from typing import Any
 import pytest
 
 from exugear.cli import tables
+from exugear.report.findings.words import figure_text
 from exugear.results.findings import Finding
+from fe_ste.tools.display import LONGEST_LIFE
 
 from ..cases.bearing import BEARING_CASE
 from ..cases.command import exugear
@@ -122,6 +125,50 @@ def test_the_page_ranks_the_resonances_that_steady_prints(folder: Path) -> None:
     assert report["resonances"] == steady["resonances"]
     said = {own["text"] for own in report["findings"]}
     assert said >= {own["text"] for own in steady["findings"] if "mesh harmonics" in own["text"]}
+
+
+def cells_of(page: str, table: str) -> list[dict[str, str]]:
+    """Cells of a table of the page by heading."""
+    (body,) = re.findall(rf'<table id="{table}".*?</table>', page, re.DOTALL)
+    head, rows = body.split("<tbody>")
+    plain = [
+        [re.sub(r"<[^>]*>", "", cell).strip() for cell in re.findall(r"<t[hd][ >].*?</t[hd]>", row, re.DOTALL)]
+        for row in (head, *re.findall(r"<tr.*?</tr>", rows, re.DOTALL))
+    ]
+    return [dict(zip(plain[0], row, strict=True)) for row in plain[1:]]
+
+
+SAFETIES = {"S_H": "contact_safety", "S_F": "root_safety", "static S_H": "contact_static", "static S_F": "root_static"}
+LIVES = {"L10 / h": "basic_hours", "L10r / h": "reference_hours", "L10m / h": "modified_hours"}
+
+
+@pytest.mark.validation
+def test_lives_and_safety_factors_of_the_page_are_those_of_life(folder: Path) -> None:
+    verb, *options = COMMANDS["steady"]
+    out = ("--out", folder / "lives")
+    assert exugear(verb, folder / "gearbox.toml", *options, *out).exit_code == 0
+    life = json.loads(exugear("life", folder / "gearbox.toml", *out, "--json").stdout)
+    report = exugear("report", folder / "lives", "--json")
+    assert report.exit_code == 0, report.stderr
+    page = html.unescape((folder / "lives" / "report.html").read_text(encoding="utf-8"))
+    tables_of_life = sorted(re.findall(r'<table id="(life-[^"]*-(?:bearings|gears))"', page))
+    assert len(tables_of_life) == 2
+    bearings, flanks = (cells_of(page, table) for table in tables_of_life)
+    for row, own in zip(flanks, life["flanks"], strict=True):
+        for heading, key in SAFETIES.items():
+            assert row[heading] == f"{own[key]:.2f}", (own["flank"], heading)
+    assert len(bearings) == len(life["bearings"])
+    compared = 0
+    for row, own in zip(bearings, life["bearings"], strict=True):
+        for heading, key in LIVES.items():
+            if isinstance(own.get(key), float) and own[key] < LONGEST_LIFE:
+                assert row[heading] == figure_text(float(f"{own[key]:.3g}")), (own["bearing"], heading)
+                compared += 1
+    assert compared >= 3
+    # The list of contacts has the smallest of both gears.
+    (contact,) = cells_of(page, "contact-table")
+    for heading, key in (("S_H", "contact_safety"), ("S_F", "root_safety")):
+        assert contact[heading] == f"{min(own[key] for own in life['flanks']):.2f}"
 
 
 def rows_of(count: int) -> tables.Table:

@@ -113,6 +113,41 @@ def test_the_sixty_loudest_peaks_of_the_grc_are_those_of_a_dense_sweep(grc, stif
     assert np.count_nonzero(off["acceleration"] > 2e-3) <= 3
 
 
+def fewest_above_half(response):
+    """Fewest speeds above half height of the ten highest peaks of each quantity."""
+    fewest = {}
+    for quantity in quantities_of([own.name for own in response.signals], ()):
+        sizes = quantity.sizes(response.solved.amplitude[:, 1:]).max(axis=2)
+        peaks = [(point, line) for line in range(sizes.shape[1]) for point in standing_peaks(sizes[:, line])]
+        counts = []
+        for point, line in sorted(peaks, key=lambda peak: -sizes[peak])[:10]:
+            low = sizes[:, line] < 0.5 * sizes[point, line]
+            before, after = np.flatnonzero(low[:point]), np.flatnonzero(low[point:])
+            ends = before.max(initial=-1), point + after.min(initial=len(low) - point)
+            counts.append(ends[1] - ends[0] - 1)
+        fewest[quantity.name] = min(counts)
+    return fewest
+
+
+@pytest.mark.validation
+@pytest.mark.parametrize("percent", [0.05, 0.2, 2.0])
+def test_the_highest_peaks_have_five_speeds_above_half_their_height(tmp_path, monkeypatch, percent):
+    """Resonances narrower than the distance of the even speeds, which were triangles, and wider ones."""
+    path = tmp_path / "gearbox.toml"
+    text = template("parallel").replace("modal_percent = 2.0", f"modal_percent = {percent}")
+    path.write_text(text.replace("[1.0, 4.0]", "[0.01, 4.0]"), encoding="utf-8")
+    stiffness = {"stage_1": stiff(6e8, 0.03, 0.015), "stage_2": stiff(9e8, 0.05, 0.02)}
+    assembly = assemble(Gearbox.from_toml(path), BUSHING, stiffness)
+    settings = SteadySettings(SpeedRange(300.0 * RPM, 900.0 * RPM, 60), harmonics=4)
+    response = response_of(assembly, settings)
+    assert min(fewest_above_half(response).values()) >= 5
+    monkeypatch.setattr("exugear.steady.steady_response.missed_flanks", lambda *_: np.zeros(0))
+    before = response_of(assembly, settings)
+    assert (min(fewest_above_half(before).values()) < 5) == (percent < 1.0)
+    assert len(response.solved.speed) - len(before.solved.speed) <= 100
+    assert set(before.solved.speed) <= set(response.solved.speed)
+
+
 @pytest.mark.validation
 def test_what_was_stopped_between_tops_goes_on_to_the_same_numbers(parallel):
     settings, kept, seen = SteadySettings(SpeedRange(30.0, 60.0, 20), harmonics=4), [], []

@@ -138,7 +138,7 @@ def test_a_hostile_name_is_shown_as_it_is(shown):
 
 
 def test_units_stand_beside_the_numbers(shown):
-    assert repr(shown["MeshTable"]).endswith(": 3 positions, 50 to 100 N m, 90 mm, -100 to 100 urad>")
+    assert repr(shown["MeshTable"]).endswith(": 3 positions, 50 to 100 N m, 90 mm, -100 to 100 µrad>")
     assert "normal module 3 mm" in repr(GEAR)
     page = Page()
     page.feed(PAIR._repr_html_())

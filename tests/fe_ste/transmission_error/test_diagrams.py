@@ -170,6 +170,13 @@ def test_a_table_draws_its_quantities_on_axes_of_the_caller_or_new_ones():
     (curve,) = stored.plot("contact").lines
     np.testing.assert_array_equal(curve.get_xdata(), 1e3 * state["axial_position"])
     np.testing.assert_array_equal(curve.get_ydata(), 1e-3 * along)
+    several = stored.dataset.isel(misalignment=[0, 0, 0]).assign_coords(misalignment=[-2e-4, 1e-4, 3e-4])
+    middle = several.assign(ste=several["ste"] * xr.DataArray([1.0, 2.0, 3.0], dims="misalignment"))
+    panel = MeshTable(middle).plot()
+    assert panel.get_title() == "misalignment 100 µrad"
+    expected = 2e6 * np.delete(state["ste"].to_numpy(), 7)
+    np.testing.assert_allclose(np.delete(panel.lines[0].get_ydata()[:-1], 7), expected, rtol=1e-15)
+    assert stored.plot().get_title() == ""
     assert stored.plot("contact").get_ylabel() == "Line load, mean of the mesh cycle / (N/mm)"
 
 

@@ -198,6 +198,6 @@ def test_a_failed_state_says_where_and_leaves_the_others(compliance: PairComplia
     results = solve_positions(compliance, axes, [0])
     assert np.isnan(results.values["ste"][:, 2]).all()
     assert len(results.failures) == 6
-    for word in ("pmc 0.000", "torque 1e+07 N m", "centre distance 104.55 mm", "misalignment -1200 urad"):
+    for word in ("pmc 0.000", "torque 1e+07 N m", "centre distance 104.55 mm", "misalignment -1200 µrad"):
         assert word in results.failures[0]
     assert results.values["ste"][:, :2] == pytest.approx(grid.ste.values[:1, :2], rel=1e-10)

@@ -72,6 +72,8 @@ def test_table_has_all_axes_and_is_labelled(table: MeshTable) -> None:
 def test_static_state_is_chosen_by_value_not_by_place(table: MeshTable) -> None:
     with pytest.raises(TableError, match="torque"):
         _ = table.static_state  # of two torques none is named
+    assert table.plot().get_title() == "torque 50 N m"
+    assert "No diagram" not in table._repr_html_()
     named = MeshTable(table.dataset.assign_attrs(static_torque=100.0))
     assert float(named.static_state.torque) == 100.0
     assert float(named.static_state.misalignment) == 0.0

@@ -19,6 +19,7 @@ from exugear.gearbox.templates.kinds import template
 from exugear.gearbox.units import RPM
 from exugear.project import Project
 from exugear.report import design_study
+from exugear.report.design_study import relief_tolerance
 from exugear.report.findings.context import OTHER_INPUT
 from exugear.report.findings.design_changes import (
     LEAST_DB,
@@ -36,6 +37,7 @@ from exugear.report.findings.design_changes import (
 from exugear.report.findings.margins import margins_in_words, margins_of, shortfalls_of
 from exugear.report.findings.proposals import DesignChange, helix_change, propose_changes
 from exugear.report.findings.ranking import ranking_of
+from exugear.report.findings.words import rounded_text
 from exugear.results.folder import DESIGN_CHANGES_FILE, read_stored_gearbox
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.system.tooth_mesh import tables
@@ -304,6 +306,30 @@ def test_the_price_names_axial_force_and_nominal_stress(grc: Gearbox) -> None:
     assert "nominal contact stress of intermediate at the pitch point" in price_of(grc, changed)
     assert "nominal" not in price_of(grc, changed, nominal=False)
     assert price_of(grc, grc) == ""
+
+
+@pytest.mark.validation
+def test_the_tolerance_of_tip_relief_is_that_of_files_with_the_limits(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(tables, "TableInput", COARSE_INPUT)
+    gearbox = Gearbox.from_dict(tomllib.loads(SPUR_CASE))
+    keys = [f"gears.{gear}.modification.tip_relief" for gear in ("pinion", "wheel")]
+
+    def relieved(amount: float) -> dict[str, float]:
+        return {f"{key}_um": amount for key in keys} | {f"{key}_length_mm": 5.0 for key in keys}
+
+    swings = []
+    for amount in (5.0, 3.0, 7.0):
+        file = Project(gearbox.varied(relieved(amount)), tmp_path / f"file-{amount:g}", Choice("bushing"))
+        file.stiffness()
+        swings.append(rounded_text(1e6 * np.ptp(file.tables_at_work()["spur"].static_state["ste"].to_numpy())))
+    assert len(set(swings)) == 3
+    project = Project(gearbox, tmp_path / "study", Choice("bushing"))
+    change = DesignChange("spur-tip-relief-5", "spur: tip relief 5 µm more", "modification", relieved(5.0))
+    assert relief_tolerance(project, change) == (
+        "static transmission error of spur {} µm peak-to-peak; with 2 µm less tip relief {} µm, with 2 µm more {} µm"
+    ).format(*swings)
+    crowned = replace(change, keys={"gears.pinion.modification.lead_crowning_um": 10.0})
+    assert relief_tolerance(project, crowned) == ""
 
 
 @pytest.mark.validation

@@ -15,6 +15,7 @@ from exugear.life.rating.sheet import FlankSheet, RatingSheet
 from exugear.report.findings.flank_contacts import PairContact, _seen_by, edge_in_words, place_on_flank
 from exugear.report.findings.ratings import Ratings
 from exugear.report.pictures.flank_maps import LEFT, LOAD, RIGHT, flank_map
+from exugear.report.sections.gears import edge_cell
 from fe_ste.flank_pressure import FlankPressure
 from fe_ste.geometry.gears import Gear, GearPair
 
@@ -77,6 +78,13 @@ def test_without_a_load_at_tip_edges_no_tip_is_named(loaded_below: FlankPressure
     """A pressure at edges may come from cells whose load lies on the path."""
     edge = replace(loaded_below, edge_pressure=3e9)
     assert edge_in_words(contact(edge), {}) == edge_in_words(contact(_seen_by(edge, -1)), {}) == "–"
+
+
+def test_a_tip_edge_pressure_above_that_of_the_flank_is_marked() -> None:
+    above, below, none = (edge_cell(edge, 1.2e9) for edge in (1.5e9, 1.0e9, 0.0))
+    assert (above.shown, above.tag, below.tag) == ("1500", "mind", "")
+    assert above.caveat and above.caveat == below.caveat
+    assert (none.shown, none.tag, none.caveat) == ("–", "", "")
 
 
 def test_safety_factors_are_the_smallest_of_both_gears_and_finite_elements_count() -> None:

@@ -8,8 +8,16 @@ import tomllib
 import numpy as np
 import pytest
 
+from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.templates.kinds import template
+from exugear.gearbox.units import RPM
+from exugear.steady.balance.response import transmission_errors
+from exugear.steady.crossings import contributions
+from exugear.steady.mean_system.mesh_places import MISALIGNMENT
+from exugear.steady.point_solver import harmonic_balance_model
+from exugear.system.build import assemble
+from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.system.tooth_mesh.tables import fitting_table, requested_tables, shuttling_pairs
 
 from ...cases.command import exugear
@@ -92,3 +100,35 @@ def test_steady_says_nothing_where_the_load_stays(tmp_path):
         "4",
     ]
     assert ": load centroid shuttles by ±" not in " ".join(exugear(*asked).stderr.split())
+
+
+@pytest.mark.validation
+def test_the_part_of_the_moment_in_a_peak_is_what_the_peak_lacks_without_it(tmp_path, monkeypatch):
+    """The moment's own vibration along the sum, and the sum of a model whose load stays in its mean place."""
+    gearbox = with_tables(tomllib.loads(template("pair")), tmp_path)
+    speed, line = 2029.0 * RPM, 1
+    assembly = assemble(gearbox, Choice("bushing"), mesh_stiffness(gearbox, "line_of_action", tmp_path))
+    model = harmonic_balance_model(assembly, np.array([speed, speed]))
+    found = contributions(model, speed, line)
+    (share,) = found.shuttling.values()
+    assert found.meshes.keys() == found.shuttling.keys()
+    assert abs(share) > 0.05
+    interface = model.at(speed)
+    both = -2.0 * transmission_errors(model, interface.ports, speed)[line]
+    moment = np.zeros_like(both)
+    moment[:, MISALIGNMENT] = both[:, MISALIGNMENT]
+    dynamic = model.system.dynamic(speed, speed * model.lines.orders[line])
+    row = model.row_of_overall(speed)
+    whole, own = (
+        complex(row @ np.linalg.solve(dynamic, model.loads(interface.ports) @ forces.ravel()))
+        for forces in (both, moment)
+    )
+    assert found.amplitude == pytest.approx(abs(whole), rel=1e-9)
+    assert share == pytest.approx((own * whole.conjugate()).real / abs(whole) ** 2, rel=1e-9)
+    staying = type(model)
+    monkeypatch.setattr(staying, "cycle_ways", property(lambda given: 0.0 * model.cycle_curves[0]))
+    monkeypatch.setattr(staying, "cycle_moments_beyond", property(lambda given: 0.0 * model.cycle_curves[0]))
+    without = transmission_errors(model, interface.ports, speed)[line]
+    rest = complex(row @ np.linalg.solve(dynamic, model.loads(interface.ports) @ (-2.0 * without).ravel()))
+    # The way also moves the force of misaligned teeth, which is small here.
+    assert 1.0 - share == pytest.approx((rest * whole.conjugate()).real / abs(whole) ** 2, abs=0.05)
