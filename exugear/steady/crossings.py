@@ -108,7 +108,7 @@ def crossings(
     # Orders of a single mesh frequency and their sidebands, or of a shaft; a flexible ring gear makes sidebands of all.
     several = np.count_nonzero(index, axis=1) > 1
     if model.waves.neighbours:
-        several |= ~index.any(axis=1) | model.lines.index[:, len(model.waves.base_orders) :].any(axis=1)
+        several |= model.beside_others
     lines = [int(line) for line in np.flatnonzero(~several) if line]
     model = model.frozen
     followed = FollowedModes(model.system, tracks)

@@ -370,10 +370,6 @@ def _check_ring(assembly: Assembly, elastic: Collection[str]) -> None:
         reason = f"has {len(travelling)} planets, an even number"
     elif any(phases_ahead(assembly, meshes) for meshes in families.values()):
         reason = "has planets that mesh out of phase"
-    elif gearbox.deviations:
-        reason = "meshes with gears that deviate (deviations)"
-    elif gearbox.varying_loads:
-        reason = "vibrates under loads at orders of shafts (excitations)"
     if reason:
         raise SteadyError(
             f"bodies.{family}: the flexible ring gear {reason}, which the steady-state response cannot treat yet; set "
