@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,7 +17,8 @@ from exugear.report.findings.ranking import ranking_of
 from exugear.results.sound.levels import a_weighting, power_level
 from exugear.results.sound.over_speed import sound_over_speed
 from exugear.results.sound.radiated_power import AIR_IMPEDANCE, radiated_power
-from exugear.steady.balance.response import signals
+from exugear.steady.balance.response import signals, transmission_errors
+from exugear.steady.crossings import contributions
 from exugear.steady.findings import UPPER_ESTIMATE, response_findings
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.settings import SpeedRange, SteadySettings
@@ -116,10 +118,52 @@ def test_the_loudest_speed_is_said_with_its_loudest_order(data):
     line = sound_line(summary)
     assert f"{summary['level_dBA']:.1f} dB(A), upper estimate" in line
     assert first["line"].replace(" x ", " × ") in line
-    orders, bands = sound_tables(summary)
+    orders, bands, causes = sound_tables(summary)
     assert len(orders.rows) == 5
+    assert [row["line"] for row in causes.rows] == [row["line"] for row in orders.rows]
+    assert all(sum(row["meshes"].values()) == pytest.approx(1.0) for row in causes.rows)
     assert sum(10 ** (0.1 * row["level_dB"]) for row in bands.rows) == pytest.approx(10 ** (0.1 * summary["level_dB"]))
     assert json.dumps(summary)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_contributions_to_the_sound_power_add_up_to_it(housed, order):
+    """The velocity of the linear response, of which all meshes and all modes are parts."""
+    speed = 1500.0 * math.pi / 30.0
+    solver = PointSolver(harmonic_balance_model(housed, np.array([speed]), 10), "linear")
+    model = solver.model
+    line = int(np.flatnonzero(model.lines.index[:, 0] == order)[0])
+    found = contributions(model, speed, line, model.radiated)
+    known = 2.0 * abs(signals(model, solver.response(speed))[line, -1])
+    assert found.amplitude == pytest.approx(known, rel=1e-9)
+    assert sum(found.meshes.values()) == pytest.approx(1.0, abs=1e-9)
+    assert sum(share for _, share in found.modes) == pytest.approx(1.0, abs=0.05)
+
+
+def test_the_derivative_of_the_sound_power_is_that_of_a_gearbox_with_a_stiffer_bearing(housed):
+    """The excitation stays as it is: of a gearbox with a changed bearing only the averaged system is taken."""
+    speed = 1500.0 * math.pi / 30.0
+    model = harmonic_balance_model(housed, np.array([speed]), 10)
+    radiated = model.radiated
+    assert radiated is not None
+    line = int(np.flatnonzero(model.lines.index[:, 0] == 1)[0])
+    frequency = speed * float(model.lines.orders[line])
+    interface = model.at(speed)
+    loads = model.loads(interface.ports) @ transmission_errors(model, interface.ports, speed)[line].ravel()
+    derivative = contributions(model, speed, line, radiated).supports
+    name = max(derivative, key=lambda family: abs(derivative[family]))
+    own = np.array([support.family == name for support in housed.supports])
+    velocities = []
+    for factor in (1.001, 0.999):
+        changed = np.where(own, factor, 1.0)[:, None, None]
+        arrays = housed.connectors
+        arrays = arrays._replace(stiffness=arrays.stiffness * changed, damping=arrays.damping * changed)
+        other = harmonic_balance_model(replace(housed, connectors=arrays), np.array([speed]), 10)
+        motion = np.linalg.solve(other.system.dynamic(speed, frequency), loads)
+        velocities.append(float(radiated.surface_velocity(motion[None, :], np.array([frequency]))[0]))
+    slope = (velocities[0] - velocities[1]) / (0.001 * sum(velocities))
+    assert abs(slope) > 0.05
+    assert derivative[name] == pytest.approx(slope, rel=0.02, abs=0.02)
 
 
 def test_a_rigid_housing_has_no_sound_power(housed):
