@@ -6,10 +6,9 @@ A study draws several uncertain inputs at once and shows which of them moves a n
 """
 
 # %%
-# The gearbox is that of ``exugear new gearbox.toml --kind parallel``. Two inputs that are seldom known are drawn between
-# bounds: the stiffness factor of the housing, and a factor on the inertia of the output shaft with what it drives. The
-# output is the mode nearest to 430 Hz of those that strain the bearing ``middle_right``. The mesh model ``iso6336``
-# needs no tables.
+# The gearbox is that of ``exugear new gearbox.toml --kind parallel``. Two inputs that are seldom known are drawn within
+# bounds: the stiffness factor of the housing, and a factor on the inertia of the output shaft. The output is the mode
+# nearest to 430 Hz of those that strain the bearing ``middle_right``. The mesh model ``iso6336`` needs no tables.
 
 from pathlib import Path
 
@@ -50,8 +49,8 @@ study = Study.from_toml(folder / "inputs.study.toml")
 print(study)
 
 # %%
-# Finished points are kept: a second call computes nothing. One worker is this process itself; ``exugear study`` uses all
-# cores. The results are one dataset.
+# Finished points are kept: a second call computes nothing. One worker is this process itself; ``exugear study`` uses
+# all cores. The results are one dataset.
 
 run_study(study, folder / "points", processes(1))
 data = load_study(folder / "points" / "study.nc")

@@ -297,6 +297,7 @@ LAYOUT: dict[str, tuple[str, ...]] = {
     "mode_frequency": ("campbell_point", "mode"),
     "mode_damping": ("campbell_point", "mode"),
     "mode_whirl": ("campbell_point", "mode"),
+    "mode_over_angle": ("mode", "bound"),
     "mode_kind": ("mode",),
     "mode_name": ("mode",),
 }
@@ -316,6 +317,9 @@ class Campbell(ReprMixin, line=": {names!n} modes at {speeds!n} speeds"):
     whirl: Floats
     """(n, m) Hz as seen from the housing, share of critical damping, and sense of the whirl as `NamedMode` has it;
     NaN where a mode is none."""
+    over_angle: Floats
+    """(m, 2) lowest and highest frequency over the angle of the carrier, over that at zero angle, as
+    `frequencies_over_angle` finds them."""
     kinds: tuple[str, ...]
     names: tuple[str, ...]
     """As `NamedMode` has them, at the fastest speed."""
@@ -338,6 +342,10 @@ class Campbell(ReprMixin, line=": {names!n} modes at {speeds!n} speeds"):
             "mode_frequency": (self.frequency, {"units": "Hz", "long_name": "as seen from the housing"}),
             "mode_damping": (self.damping, {"units": "1", "long_name": "share of critical damping"}),
             "mode_whirl": (self.whirl, {"units": "1", "long_name": "1 forward whirl, -1 backward whirl"}),
+            "mode_over_angle": (
+                self.over_angle,
+                {"units": "1", "long_name": "lowest and highest over the carrier's angle, over that at zero angle"},
+            ),
             "mode_kind": (np.array(self.kinds, dtype=object), {}),
             "mode_name": (np.array(self.names, dtype=object), {}),
         }
@@ -355,11 +363,39 @@ def modes_over_speed(system: MeanSystem, low: float, high: float, highest: float
     return mode_tracks(modes_at, low, high)
 
 
+def frequencies_over_angle(system: MeanSystem, tracks: ModeTracks) -> Floats:
+    """Lowest and highest frequency of modes (m, 2) over the angle of the carrier, over that at zero angle.
+
+    The stiffness of a flexible ring gear differs from place to place: frequencies vary as the planets pass. They are
+    those with the carrier held at angles spread over a planet passage, at the middle one of the speeds. Modes that
+    depend on one angle do not cross (von Neumann and Wigner 1929): the n-th frequency at each angle is that of one
+    mode, whose shape turns with the planets. Both are 1 without a flexible ring gear.
+    """
+    found = np.ones((tracks.frequency.shape[1], 2))
+    if system.over_angle is None:
+        return found
+    middle = len(tracks.speeds) // 2
+    held = [mean_modes(one, float(tracks.speeds[middle]))[0].imag for one in system.at_angles()]
+    if not len(held[0]):
+        return found
+    # Rolling is free at zero angle. Elsewhere the state is not quite the static one, which gives it a low frequency.
+    held = [values[values > 0.5 * held[0][0]] for values in held]
+    count = min(map(len, held))
+    over_zero = np.array([values[:count] / held[0][:count] for values in held])
+    own = tracks.eigenvalues[middle].imag
+    for mode in np.flatnonzero(~np.isnan(own)).tolist():
+        place = int(np.argmin(np.abs(held[0] - own[mode])))
+        if place < count:
+            found[mode] = over_zero[:, place].min(), over_zero[:, place].max()
+    return found
+
+
 def campbell_of(system: MeanSystem, tracks: ModeTracks) -> Campbell:
-    """Campbell diagram of the modes of an averaged system, followed over speed."""
+    """Campbell diagram of the modes of an averaged system with the carrier held at zero angle, followed over speed."""
+    frozen = system.frozen
     low = tracks.speeds[0]
     high = tracks.speeds[-1]
-    namer = ModeNamer(system, high if abs(high) > abs(low) else low)
+    namer = ModeNamer(frozen, high if abs(high) > abs(low) else low)
     whirl = np.full(tracks.frequency.shape, np.nan)
     for n, m in zip(*np.nonzero(~np.isnan(tracks.frequency)), strict=True):
         whirl[n, m] = namer.whirl(tracks.shapes[n, m])
@@ -369,6 +405,7 @@ def campbell_of(system: MeanSystem, tracks: ModeTracks) -> Campbell:
         tracks.frequency,
         tracks.damping,
         whirl,
+        frequencies_over_angle(system, tracks),
         tuple(mode.kind for mode in named),
         tuple(mode.name for mode in named),
     )
@@ -378,8 +415,8 @@ def campbell_from(data: xr.Dataset) -> Campbell:
     """Read a diagram from the dataset of a file that holds one."""
     values = {name: data[name].to_numpy() for name in LAYOUT}
     kinds, names = (tuple(str(value) for value in values[name]) for name in ("mode_kind", "mode_name"))
-    speeds, frequency, damping, whirl = (values[name] for name in list(LAYOUT)[:4])
-    return Campbell(speeds, frequency, damping, whirl, kinds, names)
+    speeds, frequency, damping, whirl, over_angle = (values[name] for name in list(LAYOUT)[:5])
+    return Campbell(speeds, frequency, damping, whirl, over_angle, kinds, names)
 
 
 def _fastest(tracks: ModeTracks, mode: int) -> int:

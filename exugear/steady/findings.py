@@ -206,6 +206,15 @@ def _passing(data: xr.Dataset) -> Iterator[Finding]:
     text = f"flexible ring gear: {count} orders of passing planets and beside mesh orders are included; those left out "
     text += f"change the transmission error and the deflections of the meshes by at most {100.0 * left_out:.1g} %"
     yield Finding("warning" if left_out > NOTICED_NEIGHBOURS else "note", text, left_out)
+    over_angle = data["mode_over_angle"].to_numpy()
+    if over_angle.size:
+        spread = over_angle[:, 1] - over_angle[:, 0]
+        most = int(np.argmax(spread))
+        frequency = float(np.nanmean(data["mode_frequency"].to_numpy()[:, most]))
+        low, high = 100.0 * (over_angle[most] - 1.0)
+        text = "natural frequencies are those with the carrier at zero angle; as the planets pass the ring gear, they "
+        text += f"vary from {low:.2g} to {high:+.2g} % at most (mode at {frequency:.0f} Hz)"
+        yield Finding("note", text, float(spread[most]))
 
 
 def _excitation(data: xr.Dataset) -> Iterator[Finding]:

@@ -71,6 +71,11 @@ from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
 
 SAMPLES_PER_HARMONIC = 16
 """Minimum samples per mesh period over the harmonics, with contact loss: kinks need more than products of orders."""
+SHAFT_NEIGHBOURS = 3
+"""Multiples of the planet passing frequency by which a flexible ring gear couples orders of shafts to others.
+
+Half as many as of the meshes' orders: there are many of them. In the planetary stage of the GRC they change by 1e-6 at
+most with twice as many."""
 MOST_LINES = 500
 """Combinations up to which lines are looked for: those up to the eighth of three mesh frequencies, the 21st of two."""
 
@@ -305,21 +310,39 @@ class HarmonicBalanceModel:
         other.lines = self.lines.part(which)
         return other
 
-    def _lines_within(self, reach: HarmonicTruncation, products: bool = False) -> LineSet:
+    def _lines_within(
+        self, reach: HarmonicTruncation, products: bool = False, neighbours: int | None = None
+    ) -> LineSet:
         """Orders up to a limit, with the sidebands of planets that mesh out of phase, and the orders of shafts.
 
-        With `products`, sums and differences of the orders of two stated loads are among them.
+        With `products`, sums and differences of the orders of two stated loads are among them. `neighbours` is the
+        number of orders that a flexible ring gear adds on either side of each; by default that of the waves.
         """
         waves = self.waves
         lines = line_set(waves.base_orders.tolist(), reach.harmonics, reach.combinations)
         modulators = [planets for _, planets in waves.carriers]
-        if waves.neighbours:
-            lines = beside(lines, modulators, waves.neighbours)
-        else:
-            lines = beside(lines, modulators, 0) if waves.passing else modulated(lines, modulators)
         slow = self.shaft_orders
         sidebands = slow.sidebands + (slow.products if products else ())
+        ring = self.ring
+        if ring is not None and ring.planets is not None:
+            most = waves.neighbours if neighbours is None else neighbours
+            lines = beside(lines, modulators, most)
+            most = min(most, SHAFT_NEIGHBOURS)
+            step = ring.planets.waves
+            carrier = ring.carrier - len(waves.base_orders)
+            sidebands = tuple(own.turned(carrier, step * n) for own in sidebands for n in range(-most, most + 1))
+        else:
+            lines = beside(lines, modulators, 0) if waves.passing else modulated(lines, modulators)
         return with_rotations(lines, slow.rotations, sidebands, len(waves.base_orders), reach.harmonics)
+
+    @cached_property
+    def beside_others(self) -> Booleans:
+        """Lines (n,) that are there because a flexible ring gear couples others to them: passing planets, sidebands."""
+        reach = HarmonicTruncation(self._usual.harmonics // 2, self._usual.combinations // 2)
+        places = self.lines.find(self._lines_within(reach, neighbours=0).index)[0]
+        found = np.ones(len(self.lines.index), dtype=bool)
+        found[places[places >= 0]] = False
+        return found
 
     @cached_property
     def without_shaft_orders(self) -> HarmonicBalanceModel:
@@ -340,8 +363,8 @@ class HarmonicBalanceModel:
         other.harmonics, other._least = 2 * harmonics, 0
         other._usual = other._reach = HarmonicTruncation(2 * harmonics, combinations)
         if self.waves.neighbours:  # those beside the known lines are known to be needed
-            more = line_set(self.waves.base_orders.tolist(), harmonics, combinations // 2)
-            other.lines = joined(self.lines, beside(more, [planets for _, planets in self.waves.carriers], 0))
+            more = self._lines_within(HarmonicTruncation(harmonics, combinations // 2), neighbours=0)
+            other.lines = joined(self.lines, more)
             return other
         other.lines = self._lines_within(HarmonicTruncation(harmonics, combinations // 2))
         other.larger = self._lines_within(other._usual, products=True)
@@ -631,7 +654,7 @@ class HarmonicBalanceModel:
     @cached_property
     def _shaft_places(self) -> Places:
         """Places of the terms of the orders of shafts among the lines."""
-        return self.shaft_orders.places(self.lines, len(self.waves.base_orders))
+        return self.shaft_orders.places(self.lines)
 
     def shaft_loads(self, speed: float, source: str | None = None) -> Complexes:
         """Generalized forces (n, size) of deviations and stated loads at the lines, or those of one excitation."""

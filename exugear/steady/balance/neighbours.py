@@ -44,9 +44,8 @@ def with_needed_neighbours(model: HarmonicBalanceModel, speeds: Floats) -> tuple
     model : with the lines of the meshes, of passing planets, and the relevant ones beside them
     changed : largest relative change of overall transmission error and deflections of the meshes by what is left out
     """
-    meshes = len(model.waves.base_orders)
-    index = model.lines.index
-    beside = index[:, meshes:].any(axis=1) & index[:, :meshes].any(axis=1)
+    assert model.ring is not None
+    beside = model.beside_others & np.delete(model.lines.index, model.ring.carrier, axis=1).any(axis=1)
     whole = side_by_side(lambda speed: _vibration(model, float(speed)), speeds)
     shares = np.array([np.linalg.norm(values[:, 1:], axis=1) for values in whole])
     shares /= np.linalg.norm(shares[:, 1:], axis=1)[:, None]

@@ -199,7 +199,7 @@ class HarmonicResidual:
         values = self.sampling.values(readings)
         if not self.model.loses_contact:
             return values, np.zeros_like(values)
-        return values, self.sampling.values(rates_of(self.model, self.interface, readings))
+        return values, self.sampling.values(rates_of(self.model, self.interface.speed, readings))
 
     def forces(self, readings: Complexes) -> tuple[Complexes, Tangent, Floats]:
         """Return the forces (n, m, f) in addition to the averaged system, and their linearisation by the readings.
@@ -288,7 +288,7 @@ class HarmonicResidual:
         angles[:, base] = 2.0 * np.pi * np.arange(samples) / samples
         places = self._places(angles)
         own = np.where(alone[:, None, None], readings, 0.0)
-        rates = rates_of(self.model, self.interface, own)
+        rates = rates_of(self.model, self.interface.speed, own)
         values = there @ lines.values(own, angles)
         moving = there @ lines.values(rates, angles)
         along = self._sample(values, moving, places, self._stiffness(places))
@@ -316,7 +316,7 @@ class HarmonicResidual:
         found = np.zeros((len(change), *self.interface.ports.forces.shape[:2]), dtype=complex)
         found[:, :m, DEFLECTION] = waves.mean_stiffness * deflection
         if self.model.loses_contact:
-            found[:, :m, DEFLECTION] += waves.damping * rates_of(self.model, self.interface, deflection)
+            found[:, :m, DEFLECTION] += waves.damping * rates_of(self.model, self.interface.speed, deflection)
         if self.interface.bearings is not None:
             slope = self.interface.bearings.slope
             own = change[:, m:, :COMPONENTS]
@@ -490,7 +490,7 @@ def response_of_readings(balance: HarmonicResidual, readings: Complexes, product
         free = np.mean((whole[..., FRONT] == 0.0) & (whole[..., BACK] == 0.0), axis=0)
         apart = np.array([free[[mean == n for mean in means]].mean() if n in means else 0.0 for n in range(len(apart))])
     else:
-        rates = rates_of(model, interface, deflection)
+        rates = rates_of(model, interface.speed, deflection)
         force = excess[:, :m, 0] + waves.mean_stiffness * deflection + waves.damping * rates
         force[0] -= waves.mean_stiffness * waves.rest
     free = _free_shares(balance, whole)

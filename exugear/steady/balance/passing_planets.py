@@ -100,9 +100,9 @@ class PassingPlanets:
         step = family.planets.waves
         passing = np.zeros(index.shape[1], dtype=np.int64)
         passing[family.carrier] = step
-        most = int(np.abs(index[:, family.carrier]).max()) // step
-        alone = index[np.abs(index[:, family.carrier]) < step]
-        rows = alone[:, None, :] + np.arange(-most, most + 1)[:, None] * passing
+        first = self._first_of_groups(family)
+        reach = 2 * int(np.abs(index[:, family.carrier]).max()) // step
+        rows = index[first, None, :] + np.arange(-reach, reach + 1)[:, None] * passing
         places, mirrored = self._lines.find(rows)
         speed = self._frequencies[-1] / self._lines.orders[-1]
         frequencies = speed * (rows @ self._lines.bases)
@@ -112,6 +112,20 @@ class PassingPlanets:
             own = places[group, member], mirrored[group, member]
             apart = step * (member[:, :, None] - member[:, None, :])
             yield self._solved(family, stiffness, answers, own, frequencies[group, member], apart)
+
+    def _first_of_groups(self, family: Family) -> Integers:
+        """First line of each group: lines are alike but for planet passages, those turned round among them."""
+        assert family.planets is not None
+        lines = self._lines
+        units = lines.index @ lines.units
+        column = int(np.flatnonzero(lines.units[family.carrier])[0])
+        turns = units[:, column].copy()
+        units[:, column] = 0
+        leading = units[np.arange(len(units)), np.argmax(units != 0, axis=1)]
+        turns = np.where(leading < 0, -turns, turns) % family.planets.waves
+        turns = np.where(leading == 0, np.minimum(turns, -turns % family.planets.waves), turns)
+        keys = np.column_stack([np.where(leading < 0, -1, 1)[:, None] * units, turns])
+        return np.sort(np.unique(keys, axis=0, return_index=True)[1])
 
     def _solved(
         self,

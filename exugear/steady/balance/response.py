@@ -116,13 +116,18 @@ def transmission_errors(model: HarmonicBalanceModel, ports: MeshInterface, speed
 
 def mean_deviation_forces(model: HarmonicBalanceModel, speed: float) -> Complexes:
     """Find the forces (n, m) of the deviations of gears in the averaged system, -k_mean e - c e', N."""
-    frequencies = abs(speed) * model.lines.orders
-    stiffness = model.waves.mean_stiffness + 1j * frequencies[:, None] * model.waves.damping
-    return np.asarray(-stiffness * model.deviations(speed))
+    waves = model.waves
+    errors = model.deviations(speed)
+    return np.asarray(-waves.mean_stiffness * errors - waves.damping * rates_of(model, speed, errors))
 
 
-def deviation_forces(model: HarmonicBalanceModel, interface: Interface) -> Complexes:
-    """Find the forces (n, m, f) of the deviations of gears, -k e - c e' with k over the mesh cycle, N and N m."""
+def deviation_forces(
+    model: HarmonicBalanceModel, interface: Interface, passing: PassingPlanets | None = None
+) -> Complexes:
+    """Find the forces (n, m, f) of the deviations of gears, -k e - c e' with k over the mesh cycle, N and N m.
+
+    `passing` has the dampers of the meshes of a flexible ring gear.
+    """
     ports = interface.ports
     forces = np.zeros((len(model.lines.index), *ports.forces.shape[:2]), dtype=complex)
     if not model.deviations(interface.speed).any():
@@ -130,8 +135,10 @@ def deviation_forces(model: HarmonicBalanceModel, interface: Interface) -> Compl
     errors = forces.copy()
     errors[..., DEFLECTION] = model.deviations(interface.speed)
     forces[..., DEFLECTION] = mean_deviation_forces(model, interface.speed)
-    beyond = model.tangents_beyond_mean.at(ports, interface.speed)
-    return forces - model.coupling.of(beyond, errors.reshape(len(errors), -1)).reshape(forces.shape)
+    beyond = model.coupling.of(model.tangents_beyond_mean.at(ports, interface.speed), errors.reshape(len(errors), -1))
+    if passing is not None:
+        beyond += passing.damper_forces(errors.reshape(len(errors), -1))
+    return forces - beyond.reshape(forces.shape)
 
 
 class MovingPositions:
@@ -224,7 +231,7 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
     repeated = bool(model.shaft_orders.sidebands) or model.ring is not None
     balance = LineBalance(model, interface, answers)
     passing = balance.passing
-    given = given_forces(model, interface) + deviation_forces(model, interface)
+    given = given_forces(model, interface) + deviation_forces(model, interface, passing)
     moved = np.zeros_like(given)
     positions = MovingPositions(model, interface) if repeated else None
     found = None
@@ -242,7 +249,7 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
             response = _response(model, interface, deflection, excess.reshape(shape), products)
             shifted = at_mean_positions(model, interface, response)
             balance = LineBalance(model, shifted, answers, passing)
-            given = given_forces(model, shifted) + deviation_forces(model, shifted)
+            given = given_forces(model, shifted) + deviation_forces(model, shifted, passing)
     return _response(model, interface, deflection, excess.reshape(shape), products)
 
 
@@ -337,19 +344,19 @@ def _response(
 ) -> Response:
     """Complete a response with the whole forces of its meshes, those of mean stiffness and damping among them."""
     waves = model.waves
-    rates = rates_of(model, interface, deflection)
+    rates = rates_of(model, interface.speed, deflection)
     force = excess[..., DEFLECTION] + waves.mean_stiffness * deflection + waves.damping * rates
     force[0] -= waves.mean_stiffness * waves.rest
     force *= waves.line_of_action
     return Response(interface, deflection, excess, force, products, np.zeros(len(waves.waves)), np.zeros(0))
 
 
-def rates_of(model: HarmonicBalanceModel, interface: Interface, values: Complexes) -> Complexes:
+def rates_of(model: HarmonicBalanceModel, speed: float, values: Complexes) -> Complexes:
     """Rates (n, m, ...) of what meshes read (n, m, ...), as the meshes see it that travel through the waves."""
-    frequencies = interface.frequencies.reshape(-1, *(1,) * (values.ndim - 1))
+    frequencies = abs(speed) * model.lines.orders.reshape(-1, *(1,) * (values.ndim - 1))
     partners = model.partners[: values.shape[1], : values.shape[1]]
     carried = np.moveaxis(np.tensordot(partners, values, axes=(1, 1)), 0, 1)
-    return np.asarray(1j * frequencies * values + interface.speed * carried)
+    return np.asarray(1j * frequencies * values + speed * carried)
 
 
 def signals(model: HarmonicBalanceModel, response: Response) -> Complexes:
@@ -389,7 +396,7 @@ def _gear_loads(model: HarmonicBalanceModel, response: Response) -> Complexes:
     if by_moment.any() and tilt[:, TILT_STIFFNESS].any():
         turned = response.motion @ model.misalignments_at(response.interface.speed).T
         moment = tilt[:, TILT_STIFFNESS] * turned
-        moment += tilt[:, TILT_DAMPING] * rates_of(model, response.interface, turned)
+        moment += tilt[:, TILT_DAMPING] * rates_of(model, response.interface.speed, turned)
         if model.shuttles:
             moment += response.excess[:, : len(waves.waves), MISALIGNMENT]
         found += moment @ by_moment

@@ -20,7 +20,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import NamedTuple
@@ -267,6 +267,17 @@ class Sidebands:
     """Base of the mesh frequency; None for the multiples by themselves."""
     reach: int | None = None
     """Highest harmonic of the mesh frequency; None for all of a line set."""
+
+    def turned(self, rotation: int, turns: int) -> Sidebands:
+        """Return those that lie some turns of one of the rotations beside these.
+
+        Examples
+        --------
+        >>> Sidebands((0, 2), base=1).turned(0, -3).multiples
+        (-3, 2)
+        """
+        multiples = (*self.multiples[:rotation], self.multiples[rotation] + turns, *self.multiples[rotation + 1 :])
+        return replace(self, multiples=multiples)
 
 
 def with_rotations(

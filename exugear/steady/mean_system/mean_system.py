@@ -9,7 +9,7 @@ differences, since these include every element; the parabolas through three spee
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, TypeVar
@@ -78,8 +78,9 @@ class MeanSystem(ReprMixin):
     variation: float
     """Largest change of stiffness over the carrier's places, over the stiffness: its mean is taken. What a flexible
     ring gear brings is left out of it: its meshes are waves around the carrier."""
-    held: tuple[Floats, Floats] | None = None
-    """(3, size, size) C and K with the carrier at zero angle; None where these are the mean ones."""
+    over_angle: tuple[Floats, Floats] | None = None
+    """(p, size, size) C and K less those at zero angle of the carrier, at p angles evenly spread over a planet passage;
+    None where they are the mean ones at any angle."""
 
     def _line(self) -> str:
         return f": {self.size} coordinates, {self.speeds.min():.4g} to {self.speeds.max():.4g} rad/s"
@@ -96,10 +97,17 @@ class MeanSystem(ReprMixin):
         The frequencies of the averaged system are higher than those at any angle, by 5 % at most in the GRC, since it
         has springs all around the ring.
         """
-        if self.held is None:
-            return self
-        damping, stiffness = self.held
-        return replace(self, damping=damping, stiffness=stiffness, held=None)
+        return next(self.at_angles()) if self.over_angle is not None else self
+
+    def at_angles(self) -> Iterator[MeanSystem]:
+        """Systems with the carrier held at the angles of a planet passage; none without a flexible ring gear."""
+        if self.over_angle is None:
+            return
+        changes = self.over_angle
+        damping = self.damping - changes[0].mean(axis=0)
+        stiffness = self.stiffness - changes[1].mean(axis=0)
+        for more_damping, more_stiffness in zip(*changes, strict=True):
+            yield replace(self, damping=damping + more_damping, stiffness=stiffness + more_stiffness, over_angle=None)
 
     @cached_property
     def _parabola(self) -> Floats:
@@ -218,12 +226,14 @@ def mean_system(assembly: Assembly, speeds: Floats) -> MeanSystem:
     static, torques, dampings, stiffnesses = (np.array(values) for values in zip(*rows, strict=True))
     mass = _mass(frame, 0.0, static[1])
     variation = 0.0
-    held = dampings, stiffnesses
+    over_angle = None
     if sets:
-        more, variation = _mean_over_places(frame, float(at[1]), static[1], (mass, dampings[1], stiffnesses[1]))
-        mass = mass + more[0]
-        dampings = dampings + more[1]
-        stiffnesses = stiffnesses + more[2]
+        changes, variation = _changes_over_places(frame, float(at[1]), static[1], (mass, dampings[1], stiffnesses[1]))
+        mass, dampings, stiffnesses = (
+            value + change.mean(axis=0) for value, change in zip((mass, dampings, stiffnesses), changes, strict=True)
+        )
+        if frame.has_elastic_ring:
+            over_angle = changes[1], changes[2]
     pinned = assembly.spin[assembly.gearbox.case.overall.input]
     return MeanSystem(
         frame,
@@ -237,7 +247,7 @@ def mean_system(assembly: Assembly, speeds: Floats) -> MeanSystem:
         pinned,
         spread,
         variation,
-        held if frame.has_elastic_ring else None,
+        over_angle,
     )
 
 
@@ -360,10 +370,6 @@ def _check_ring(assembly: Assembly, elastic: Collection[str]) -> None:
         reason = f"has {len(travelling)} planets, an even number"
     elif any(phases_ahead(assembly, meshes) for meshes in families.values()):
         reason = "has planets that mesh out of phase"
-    elif gearbox.deviations:
-        reason = "meshes with gears that deviate (deviations)"
-    elif gearbox.varying_loads:
-        reason = "vibrates under loads at orders of shafts (excitations)"
     if reason:
         raise SteadyError(
             f"bodies.{family}: the flexible ring gear {reason}, which the steady-state response cannot treat yet; set "
@@ -500,10 +506,10 @@ def _static(
     return u, torque
 
 
-def _mean_over_places(
+def _changes_over_places(
     frame: RotatingFrame, speed: float, u: Floats, here: tuple[Floats, Floats, Floats]
 ) -> tuple[tuple[Floats, ...], float]:
-    """Means of M, C and K (size, size) over the carrier's places less those at the angle zero, which are given.
+    """M, C and K, (places, size, size) each, at the carrier's places less those at the angle zero, which are given.
 
     The last result is the largest change of K over the places, over K, without the meshes of a flexible ring gear.
 
@@ -512,20 +518,20 @@ def _mean_over_places(
     SteadyError
         The stiffness changes as the carrier turns.
     """
-    more = tuple(np.zeros_like(value) for value in here)
+    places = frame.places
+    changes = tuple(np.zeros((len(places), *value.shape)) for value in here)
     largest = 0.0
     curved = any(element.is_curved for element in frame.assembly.elements)
     most = ROWS_VARIATION if frame.assembly.has_rows or curved else VARIATION
     without = frame.without_elastic_ring
     still = here[2] if without is frame else _stiffness(without, 0.0, speed, u)
-    places = frame.places
-    for psi in places[1:]:
-        there = (_mass(frame, float(psi), u), *tangents(frame, float(psi), speed, u))
-        turned = there[2] if without is frame else _stiffness(without, float(psi), speed, u)
+    for place, psi in enumerate(places[1:].tolist(), start=1):
+        there = (_mass(frame, psi, u), *tangents(frame, psi, speed, u))
+        turned = there[2] if without is frame else _stiffness(without, psi, speed, u)
         largest = max(largest, _checked_change(still, turned, most))
-        for mean, value, other in zip(more, here, there, strict=True):
-            mean += (other - value) / len(places)
-    return more, largest
+        for change, value, other in zip(changes, here, there, strict=True):
+            change[place] = other - value
+    return changes, largest
 
 
 def _checked_change(here: Floats, there: Floats, most: float) -> float:

@@ -11,7 +11,10 @@ too. The averaged system itself has no deviations. A stated load on a body, such
 one.
 
 Meshes of planets are waves around the carrier (`exugear.steady.mean_system.mesh_waves`), so that a deviation of order n
-against the carrier appears at n plus and minus multiples of the carrier's rotation. So does a load on one planet.
+against the carrier appears at n plus and minus multiples of the carrier's rotation. So does a load on one planet. A
+flexible ring gear has more waves than planets; as many waves as planets give any deviation at these, and their forces
+couple to all waves as those of deflections do. Where the carrier's rotation is a base of its own, as it is there, order
+n = h z + r of a gear with z teeth is its part r beside the cycle h of the mesh, whose phase it keeps.
 """
 
 from __future__ import annotations
@@ -38,6 +41,7 @@ from exugear.steady.mean_system.mesh_waves import MeshWaves
 from exugear.steady.mean_system.planet_sets import PlanetSet
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.system.kernels.meshes import FRAME
+from exugear.system.kernels.turning import travelling_tangent
 from exugear.system.kernels.varying_loads import VaryingLoadArrays, no_varying_loads, size_and_phase
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
@@ -64,7 +68,7 @@ class ShaftOrders:
     sidebands: tuple[Sidebands, ...] = ()
     """Lines that matter."""
     multiples: Integers = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int64))
-    """(t, b) multiples of the bases behind those of the meshes."""
+    """(t, b) multiples of all bases, those of the meshes first."""
     displacement: Complexes = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
     """(t, m) deviations of the mesh components, m."""
     reaction: Complexes = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
@@ -126,17 +130,14 @@ class ShaftOrders:
         own = np.flatnonzero((self.load >= 0) & ~self.on_planet[self.load])
         loads = self.load[own]
         added = self.loads.order[loads] * sampling.values(motion @ self.angles.T)[:, loads]
-        first = sampling.angles.shape[1] - self.multiples.shape[1]
-        angles = sampling.angles[:, first:] @ self.multiples[own].T
+        angles = sampling.angles @ self.multiples[own].T
         turned = np.exp(1j * (sense * angles + added)) - np.exp(1j * sense * angles)
         return np.asarray(2.0 * (turned @ self.reaction_at(speed, static)[own]).real)
 
-    def places(self, lines: LineSet, meshes: int) -> Places:
-        """Places of the terms in lines of which `meshes` bases are meshes."""
-        multiples = np.zeros((len(self.multiples), lines.index.shape[1]), dtype=np.int64)
-        multiples[:, meshes:] = self.multiples
-        place, mirrored = lines.find(multiples)
-        return Places(place, mirrored, (place == 0) & multiples.any(axis=1))
+    def places(self, lines: LineSet) -> Places:
+        """Places of the terms among lines."""
+        place, mirrored = lines.find(self.multiples)
+        return Places(place, mirrored, (place == 0) & self.multiples.any(axis=1))
 
 
 class Places(NamedTuple):
@@ -198,7 +199,10 @@ class _Series:
         self.waves = waves
         self.frame = waves.system.frame
         speed = float(waves.system.speeds[1])
-        self.still = self.frame.matrices(0.0)[0] @ waves.system.static_at(speed)
+        self.speed = speed
+        self.still = self._state(0.0)
+        self.cycles = [f"cycle of {name}" for name in waves.base_names]
+        """Names of the bases of the meshes."""
         self.load = waves.mean_stiffness * (waves.values(assembly.meshes.deflection, speed) - waves.rest)
         self.orders = {name: modulator.order for name, modulator in waves.carriers}
         """Order of each rotation, by its name; those of carriers whose planets mesh out of phase come first."""
@@ -211,6 +215,7 @@ class _Series:
         """Add the deviations of all meshes of a family of planets, or of a single mesh."""
         waves = self.waves.waves
         own = [n for n, wave in enumerate(waves) if wave.first == meshes[0]]
+        base = waves[own[0]].base
         sizes: dict[Key, float] = {}
         for place, mesh in enumerate(meshes):
             for end in range(2):
@@ -223,7 +228,11 @@ class _Series:
                 for (order, value), (turn, shape, row) in itertools.product(orders, turning):
                     if order == 0 and turn < 0:
                         continue  # the conjugate of that which turns the other way
-                    key = self._key(body, frame, planets, order, turn)
+                    # Whole mesh cycles count as such. Orders beside one number of them are sidebands of one kind.
+                    whole = round(order / teeth)
+                    nearest = self._key(body, frame, planets, order - teeth * whole, turn)
+                    whole *= int(math.copysign(1.0, self._relative(body, frame)))
+                    key = tuple(sorted((*nearest, (self.cycles[base], whole)))) if whole else nearest
                     displaced = np.zeros(len(waves), dtype=complex)
                     displaced[own] = value * shape
                     pushed = 1j * order * value * self.load[own[0]] * row
@@ -231,14 +240,11 @@ class _Series:
                         displaced, pushed = (2.0 * part.real.astype(complex) for part in (displaced, pushed))
                     self._add(self.displacement, (DEVIATION, key), displaced)
                     self._add(self.reaction, (DEVIATION, key), pushed)
-                    # Orders at the same distance from a mesh order are sidebands of one kind.
-                    nearest = self._key(body, frame, planets, order - teeth * round(order / teeth), turn)
                     sizes[nearest] = math.hypot(sizes.get(nearest, 0.0), float(np.linalg.norm(displaced)))
         sizes.pop((), None)
         if sizes:
             size = np.array(list(sizes.values()))
             kept = largest(size, NEGLECTED * float(np.linalg.norm(size))) & (size > 0.0)
-            base = waves[own[0]].base
             self.beside += [(key, base, None) for key, is_kept in zip(sizes, kept, strict=True) if is_kept]
 
     def add_load(self, number: int) -> None:
@@ -261,7 +267,8 @@ class _Series:
         if planets is None:
             speed = self.frame.speeds[body]
             whole = order == int(order)
-            rotation = {f"rotation of {body}": (int(order), speed)} if whole else {}
+            carriers = [name for name, _ in self.waves.carriers]
+            rotation = {body if body in carriers else f"rotation of {body}": (int(order), speed)} if whole else {}
             half = {f"half rotation of {body}": (int(2.0 * order), 0.5 * speed)} if not whole else {}
             return [(self._multiples(rotation | half), self._turned(0.0, wave))]
         # The waves around the carrier turn with it, and so do radius and tangent.
@@ -282,8 +289,9 @@ class _Series:
 
     def found(self) -> ShaftOrders:
         """Return what was collected."""
-        names = list(self.orders)
-        carriers = len(self.waves.carriers)
+        names = [*self.cycles, *self.orders]
+        meshes = len(self.cycles)
+        carriers = meshes + len(self.waves.carriers)
 
         def row(key: Key) -> tuple[int, ...]:
             multiples = dict(key)
@@ -294,8 +302,8 @@ class _Series:
         loads = self.assembly.gearbox.varying_loads
         return ShaftOrders(
             tuple(Rotation(name, self.orders[name]) for name in names[carriers:]),
-            tuple(Sidebands(row(key), base, reach) for key, base, reach in self.beside),
-            np.array([row(key) for _, key in self.displacement], dtype=np.int64).reshape(len(self.displacement), -1),
+            tuple(Sidebands(row(key)[meshes:], base, reach) for key, base, reach in self.beside),
+            np.array([row(key) for _, key in self.displacement], dtype=np.int64),
             np.array(list(self.displacement.values())),
             np.array([self.reaction[term] for term in self.displacement]),
             tuple("" if n == DEVIATION else loads[n].excitation for n, _ in self.displacement),
@@ -324,6 +332,25 @@ class _Series:
         values = values * np.exp(1j * np.arange(len(values)) * angle)
         return [(n, complex(x)) for n, x in enumerate(values) if abs(x) > LEAST * np.abs(values).max()]
 
+    def _state(self, psi: float) -> Floats:
+        """Return static coordinates at an angle of the input (rad), behind them those of a flexible ring at planets."""
+        q = self.frame.state(psi, self.speed, self.waves.system.static_at(self.speed))[0]
+        return self.assembly.with_travelling(q, np.zeros_like(q))[0]
+
+    def _row(self, angles: list[tuple[int, float]], psi: float) -> Floats:
+        """Row (size,) of a gear's angle, the sum of coordinates with signs, by those of the frame at an angle (rad)."""
+        size = self.assembly.size
+        turning = np.zeros(size)
+        if any(at >= size for at, _ in angles):
+            x = self._state(psi)
+            still = np.zeros_like(x)
+            seats = travelling_tangent(x, still, still, self.assembly.travelling).place
+            turning = np.sum([sign * seats[at] for at, sign in angles], axis=0)
+        else:
+            for at, sign in angles:
+                turning[at] += sign
+        return np.asarray(turning @ self.frame.matrices(psi)[0])
+
     def _angles(self, mesh: int, end: int) -> list[tuple[int, float]]:
         """Coordinates of a gear's angle against its frame, each with its sign."""
         index = self.assembly.meshes.coordinates[mesh]
@@ -336,25 +363,26 @@ class _Series:
         """Multiples of the carrier's angle, with the shares of a mesh in waves and of its gear's angle in motion."""
         angles = self._angles(mesh, end)
         if planets is None:
-            rotation = self.frame.matrices(0.0)[0]
-            row = sum((sign * rotation[at] for at, sign in angles), np.zeros(len(rotation)))
-            return [(0, np.ones(1), row.astype(complex))]
-        most = planets.waves // 2
+            return [(0, np.ones(1), self._row(angles, 0.0).astype(complex))]
+        most = max(planets.waves, waves) // 2
         samples = 2 * (2 * most + 1)
         turned = 2.0 * np.pi * np.arange(samples) / samples
+        # A flexible ring has more waves than planets: as many as planets give any deviation at these.
         values = planets.values(turned)[:, :, :waves]
-        shapes = values[:, place] / (values[0] ** 2).sum(axis=0)
-        rows = []
-        for angle in turned:
-            rotation = self.frame.matrices(angle / planets.ratio)[0]
-            rows.append(sum((sign * rotation[at] for at, sign in angles), np.zeros(len(rotation))))
+        shapes = np.zeros((samples, waves))
+        shapes[:, : values.shape[2]] = values[:, place] / (values[0] ** 2).sum(axis=0)
+        rows = [self._row(angles, angle / planets.ratio) for angle in turned]
         of_shapes = np.fft.fft(shapes, axis=0) / samples
-        of_rows = np.fft.fft(np.array(rows), axis=0) / samples
+        of_rows = np.fft.fft(rows, axis=0) / samples
         return [(turn, of_shapes[turn], of_rows[turn]) for turn in range(-most, most + 1)]
+
+    def _relative(self, body: str, frame: str) -> float:
+        """Spin of a body against its frame over the spin of the input."""
+        return self.frame.speeds.get(body, 0.0) - self.frame.speeds.get(frame, 0.0)
 
     def _key(self, body: str, frame: str, planets: PlanetSet | None, order: int, turn: int) -> Key:
         """Multiples of rotations: of a body against its frame, and of the carrier of planets."""
-        relative = self.frame.speeds.get(body, 0.0) - self.frame.speeds.get(frame, 0.0)
+        relative = self._relative(body, frame)
         rotations: dict[str, tuple[int, float]] = {}
         if order:
             name = f"rotation of {body}"

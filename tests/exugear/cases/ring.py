@@ -19,14 +19,18 @@ PLANETARY = ("sun", "planet", "ring")
 STIFF = {"radial_N_per_m": 4e9, "axial_N_per_m": 4e9, "tilt_N_m_per_rad": 1e9, "torsion_N_m_per_rad": 1e9}
 
 
-def write_rim(file: Path) -> None:
-    """Rim of the ring as flat-sided bricks, the corners of each cross-section on two circles."""
+def write_rim(file: Path, oval: float = 0.0) -> None:
+    """Rim of the ring as flat-sided bricks, the corners of each cross-section on two circles.
+
+    With `oval` (m) it is that much thinner at two opposite places, so that its stiffness differs around it.
+    """
     meshio: Any = importlib.import_module("meshio")
     logical = skfem.MeshHex.init_tensor(
         np.array([INNER, OUTER]), np.arange(AROUND + 1.0), np.linspace(-FACE / 2.0, FACE / 2.0, 3)
     )
     radius, number, z = logical.p
     angle = 2.0 * np.pi * number / AROUND
+    radius = radius + np.where(radius < OUTER, oval * np.cos(angle) ** 2, 0.0)
     points = np.stack([radius * np.cos(angle), radius * np.sin(angle), z + MIDDLE], axis=1)
     _, first, joined = np.unique(np.round(points, 9), axis=0, return_index=True, return_inverse=True)
     cells = joined.ravel()[logical.t.T[:, np.argsort([6, 2, 5, 7, 1, 3, 4, 0])]]  # order of VTK

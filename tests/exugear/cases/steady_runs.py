@@ -161,3 +161,26 @@ def apart(solver, speed, duration, step, last, assembly=None):
     known = 2.0 * signals(solver.model, solver.response(measured))[1:, 0]
     size = np.linalg.norm(known)
     return np.linalg.norm(lines - known) / size, np.linalg.norm(abs(lines) - abs(known)) / size
+
+
+def apart_over_time(solver, speed, duration, step, last, assembly=None, name="overall_dte_angle"):
+    """Difference of a signal over time between response and run, over its vibration: orders may lie close together.
+
+    The response is solved again at the speed that the run has, as in `apart`.
+    """
+    model = solver.model
+    response = solver.response(speed)
+    time, found, angle = run_from(model, response, duration, step, drive_of(model, response), assembly, name)
+    late = time > duration - last
+    sense = np.copysign(1.0, speed)
+    mean, start = np.polyfit(time[late], angle[late], 1)
+    for _ in range(2):  # without what slow orders of the vibration add to the angle
+        angles = np.outer(sense * (mean * time[late] + start), model.lines.bases)
+        own = model.lines.values(response.motion[:, [model.system.pinned]], angles)[:, 0]
+        mean, start = np.polyfit(time[late], angle[late] - own, 1)
+    column = 0 if name == "overall_dte_angle" else [own.name for own in model.signal_names].index(name)
+    lines = signals(model, solver.response(float(mean)))[:, column]
+    angles = np.outer(sense * (mean * time[late] + start), model.lines.bases)
+    known = model.lines.values(lines, angles)
+    change = found[late] - known
+    return float(np.std(change) / np.std(known))
