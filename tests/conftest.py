@@ -12,7 +12,10 @@ import pytest
 import typer.testing
 
 TRACEBACK = "traceback of a command"
-ASKING_TO_STOP = (signal.SIGINT, signal.SIGHUP, signal.SIGTERM, signal.SIGQUIT, signal.SIGPIPE)
+ASKING_TO_STOP = tuple(
+    getattr(signal, name) for name in ("SIGINT", "SIGHUP", "SIGTERM", "SIGQUIT", "SIGPIPE") if hasattr(signal, name)
+)
+"""Signals by which a terminal or a system ends programs; Windows has fewer."""
 
 
 @contextmanager
@@ -34,8 +37,11 @@ def terminal_signals() -> Iterator[None]:
     """Signals as they come from a terminal, for a test that sends some and for the processes that it starts.
 
     A shell that starts tests in its background ignores SIGINT for them, `nohup` SIGHUP, and children inherit both.
-    Tests that send signals ask for this; during all others a hangup stays ignored where `nohup` has it so.
+    Tests that send signals ask for this, and are skipped on Windows; during all others a hangup stays ignored where
+    `nohup` has it so.
     """
+    if not hasattr(signal, "pthread_sigmask"):
+        pytest.skip("this system has no signals of a terminal")
     with signals_of_a_terminal():
         yield
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib
+import importlib.util
 import os
 import re
 import subprocess
@@ -80,6 +81,24 @@ def test_claims_have_five_entries_and_name_tests_that_exist(name):
 
 
 HEADING = re.compile(r"^#+ (What|Where|How(?!-to| far can I trust it)|Why|When|Which (?!model when))\b", re.M)
+
+
+def claims_tables():
+    spec = importlib.util.spec_from_file_location("claims_tables", DOCS / "tools" / "claims_tables.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_many_claims_are_compared_with_sources_from_outside_and_each_is_counted_once():
+    pytest.importorskip("sphinx")
+    tool = claims_tables()
+    found = tool.from_outside()
+    rows = [tuple(row) for kind in found.values() for row in kind]
+    assert len(rows) == len(set(rows)) >= 59  # 728 designations, 16 bearings and 19 trains are one claim each
+    assert min(map(len, found.values())) >= 7
+    assert f"| all | {len(rows)} |" in tool.sources_table()
+    assert tool.SOURCES in (DOCS / "validation" / "trust.md").read_text(encoding="utf-8")
 
 
 def pages():

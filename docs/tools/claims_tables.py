@@ -1,7 +1,8 @@
 """Tables of validation claims and of promises: data of ``docs/validation``, put into the pages of the site.
 
 A page names a table of ``claims.toml`` by the comment ``<!-- claims: NAME -->``, and one of ``promises.toml`` by
-``<!-- promises: NAME -->``.
+``<!-- promises: NAME -->``. ``<!-- sources -->`` stands for the number of claims by kind of source from outside. Run as
+a program, ``python docs/tools/claims_tables.py``, it prints these claims with source, result, tolerance and test.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from sphinx.application import Sphinx
 FOLDER = Path(__file__).parent.parent / "validation"
 HEADS = {"claims": ("Claim", "Reference", "Result", "Tolerance", "Test"), "promises": ("Promise", "Test")}
 COMMENT = re.compile(rf"^<!-- ({'|'.join(HEADS)}): (\w+) -->$", re.MULTILINE)
+
+SOURCES = "<!-- sources -->"
 
 Rows = list[list[str]]
 
@@ -45,6 +48,25 @@ def with_tables(text: str, rows: dict[tuple[str, str], Rows]) -> str:
     return COMMENT.sub(lambda found: _table(HEADS[found[1]], rows[found[1], found[2]]), text)
 
 
+def from_outside() -> dict[str, Rows]:
+    """Return the claims that are compared with a source from outside, by the kind of source; each claim once."""
+    kinds = tomllib.loads((FOLDER / "sources.toml").read_text(encoding="utf-8"))["kinds"]
+    found: dict[str, Rows] = {kind: [] for kind in kinds}
+    claims = [row for (kind, _), rows in tables().items() if kind == "claims" for row in rows]
+    for row in claims:
+        kind = next((name for name, words in kinds.items() if re.search(words, " ".join(row[:2]))), None)
+        if kind is not None:
+            found[kind].append(row)
+    return found
+
+
+def sources_table() -> str:
+    """Return the number of claims by kind of source, in Markdown."""
+    found = from_outside()
+    counts = [[kind, str(len(rows))] for kind, rows in found.items()]
+    return _table(("Source", "Claims"), [*counts, ["all", str(sum(map(len, found.values())))]])
+
+
 def _table(head: tuple[str, ...], rows: Rows) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in (head, ["---"] * len(head), *rows))
 
@@ -52,13 +74,26 @@ def _table(head: tuple[str, ...], rows: Rows) -> str:
 def _put_in(app: Sphinx, docname: str, source: list[str]) -> None:
     if COMMENT.search(source[0]):
         source[0] = with_tables(source[0], tables())
+    if SOURCES in source[0]:
+        source[0] = source[0].replace(SOURCES, sources_table())
 
 
 def _read_again(app: Sphinx, env: object, docnames: list[str]) -> None:
     """Read pages with claims in every build, since Sphinx does not see changes of the data."""
-    found = {name for name in app.env.found_docs if COMMENT.search(_text(Path(app.env.doc2path(name))))}
+    found = {name for name in app.env.found_docs if _has_tables(_text(Path(app.env.doc2path(name))))}
     docnames[:] = sorted({*docnames, *found})
 
 
 def _text(file: Path) -> str:
     return file.read_text(encoding="utf-8") if file.suffix == ".md" else ""
+
+
+def _has_tables(text: str) -> bool:
+    return SOURCES in text or COMMENT.search(text) is not None
+
+
+if __name__ == "__main__":
+    for _kind, _rows in from_outside().items():
+        print(f"\n{_kind}: {len(_rows)}")
+        for _row in _rows:
+            print("  " + " | ".join(_row))

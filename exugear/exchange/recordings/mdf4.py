@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -154,7 +155,8 @@ def _limit(memory: int, seconds: float) -> None:
         return
     for kind, value in ((resource.RLIMIT_AS, memory), (resource.RLIMIT_CPU, math.ceil(4.0 * seconds))):
         _, most = resource.getrlimit(kind)
-        resource.setrlimit(kind, (value if most == resource.RLIM_INFINITY else min(value, most), most))
+        with suppress(ValueError, OSError):  # macOS refuses some limits of memory
+            resource.setrlimit(kind, (value if most == resource.RLIM_INFINITY else min(value, most), most))
 
 
 def _channels(request: Mapping[str, Any]) -> Iterator[dict[str, str]]:
