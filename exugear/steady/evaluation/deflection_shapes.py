@@ -49,7 +49,8 @@ def deflection_shapes(
     (size,) complex peak amplitude of each coordinate, m and rad; None where the stored state is not found again.
     """
     settings = settings_of(data.attrs)
-    model = harmonic_balance_model(assembly, settings.speeds.values, settings.harmonics, settings.combinations)
+    reach = settings.harmonics, settings.combinations
+    model = harmonic_balance_model(assembly, settings.speeds.values, *reach, settings.method)
     turned = model.system.frame.matrices(0.0)[0]
     shapes: list[Complexes | None] = []
     for order, speed in resonances:
