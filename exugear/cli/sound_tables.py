@@ -7,6 +7,7 @@ from typing import Any
 
 from exugear.cli.resonances import FREQUENCY, ORDER
 from exugear.cli.tables import Column, Table, significant
+from exugear.results.causes import shares, strongest
 
 LEVELS = (Column("dB", "level_dB", ".1f"), Column("dB(A)", "level_dBA", ".1f"))
 LEGEND = "Equivalent radiated power of the outer surface, dB re 1 pW: an upper estimate."
@@ -34,7 +35,7 @@ def sound_line(sound: Mapping[str, Any]) -> str:
 
 
 def sound_tables(sound: Mapping[str, Any]) -> list[Table]:
-    """Return the orders and the third octaves at the loudest speed."""
+    """Return the orders and the third octaves at the loudest speed, and what makes the loudest orders."""
     at = f"at {_speed(sound)} rpm, {sound['level_dB']:.1f} dB, {sound['level_dBA']:.1f} dB(A)"
     surface = (
         f"Outer surface {significant(sound['outer_surface_m2'], 3)} of {significant(sound['whole_surface_m2'], 3)}"
@@ -49,8 +50,29 @@ def sound_tables(sound: Mapping[str, Any]) -> list[Table]:
             noun="orders",
         ),
         Table(f"Sound power in third octaves {at}", sound["third_octaves"], [centre, *LEVELS], LEGEND, noun="bands"),
+        Table(
+            f"Contributions to the sound power of the loudest orders {at}",
+            sound["contributions"],
+            [
+                ORDER,
+                FREQUENCY,
+                Column("excited by", lambda own: shares(own["meshes"].items()), is_text=True),
+                Column(
+                    "modes",
+                    lambda own: shares((f"{value:.0f} Hz", share) for value, share in own["modes"]),
+                    is_text=True,
+                ),
+                Column("stiffness of", lambda own: strongest(own["supports"]), is_text=True),
+            ],
+            "Shares of the power of the linear response; stiffness: relative change of the surface velocity by it.",
+            noun="orders",
+        ),
     ]
 
 
 def _speed(sound: Mapping[str, Any]) -> str:
     return significant(sound["speed_rpm"], 3)
+
+
+def _modes(own: Mapping[str, Any]) -> str:
+    return shares((f"{value:.0f} Hz", share) for value, share in own["modes"])

@@ -376,6 +376,10 @@ def frequencies_over_angle(system: MeanSystem, tracks: ModeTracks) -> Floats:
         return found
     middle = len(tracks.speeds) // 2
     held = [mean_modes(one, float(tracks.speeds[middle]))[0].imag for one in system.at_angles()]
+    if not len(held[0]):
+        return found
+    # Rolling is free at zero angle. Elsewhere the state is not quite the static one, which gives it a low frequency.
+    held = [values[values > 0.5 * held[0][0]] for values in held]
     count = min(map(len, held))
     over_zero = np.array([values[:count] / held[0][:count] for values in held])
     own = tracks.eigenvalues[middle].imag

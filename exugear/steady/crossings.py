@@ -19,6 +19,7 @@ from functools import partial
 import numpy as np
 import scipy.linalg
 
+from exugear.results.sound.radiated_power import RadiatedPower
 from exugear.steady.balance.excitation import HarmonicBalanceModel
 from exugear.steady.balance.interface import Interface
 from exugear.steady.balance.response import mean_deviation_forces, transmission_errors
@@ -376,12 +377,12 @@ LEAST_MODE = 0.01
 
 @dataclass(frozen=True)
 class Contributions:
-    """Contributions to an order of the overall transmission error at one speed."""
+    """Contributions to an order of the overall transmission error, or of the sound power, at one speed."""
 
     speed: float
     """Of the input, rad/s."""
     amplitude: float
-    """Peak amplitude of the line at the level `linear`, m."""
+    """Peak amplitude of the line at the level `linear`, m; of the surface velocity, m/s."""
     meshes: Mapping[str, float]
     """Share by family of meshes, and by stated torque."""
     shuttling: Mapping[str, float]
@@ -394,22 +395,30 @@ class Contributions:
     mean stiffness of the meshes and the excitation staying as they are."""
 
 
-def contributions(model: HarmonicBalanceModel, speed: float, line: int) -> Contributions:
-    """Find what makes a line of the overall transmission error at a speed.
+def contributions(
+    model: HarmonicBalanceModel, speed: float, line: int, radiated: RadiatedPower | None = None
+) -> Contributions:
+    """Find what makes a line of the overall transmission error, or of the sound power, at a speed.
+
+    The surface velocity is the root mean square over the surface. What a part of the motion contributes is its part
+    along the whole, integrated over the surface: shares of the sound power add up to one like those of a signal.
 
     Parameters
     ----------
     model : of a law along a row, which has a first-order excitation
     speed : of the input, rad/s
     line : place in the line set, of one base alone: combinations are no sum over meshes
+    radiated : surface whose velocity is explained; by default the overall transmission error is
     """
     frequency = abs(speed) * float(model.lines.orders[line])
-    row = model.row_of_overall(speed)
     forces, loads = _excitation(model, speed, line)
     dynamic = model.system.dynamic(speed, frequency)
     # One solution from either side: what the signal sees of any load, and what moves under these loads.
-    adjoint = np.linalg.solve(dynamic.T, row.astype(np.complex128)).astype(np.complex128)
     motion = np.linalg.solve(dynamic, loads).astype(np.complex128)
+    row = model.row_of_overall(speed).astype(np.complex128)
+    if radiated is not None:
+        row = radiated.row_along(motion, frequency)
+    adjoint = np.linalg.solve(dynamic.T, row).astype(np.complex128)
     total = complex(row @ motion)
     meshes: dict[str, float] = {}
     shuttling: dict[str, float] = {}
@@ -461,16 +470,17 @@ def _share(part: complex, total: complex) -> float:
 
 
 def _modes(
-    model: HarmonicBalanceModel, speed: float, frequency: float, loads: Complexes, row: Floats, total: complex
+    model: HarmonicBalanceModel, speed: float, frequency: float, loads: Complexes, row: Complexes, total: complex
 ) -> tuple[tuple[float, float], ...]:
     """Shares of the modes of the averaged system, those of negative frequency counted with their conjugates."""
     values, right, left = mean_modes(model.system, speed)
     size = model.system.size
     pushed = np.linalg.solve(model.system.mass, loads)
     found = []
-    for value, shape, partner in zip(values, right[:, :size] @ row, left[:, size:], strict=True):
-        part = shape * (partner @ pushed) / (1j * frequency - value)
-        part += np.conj(shape) * (partner.conj() @ pushed) / (1j * frequency - np.conj(value))
+    seen, conjugate = right[:, :size] @ row, right[:, :size].conj() @ row
+    for value, own, other, partner in zip(values, seen, conjugate, left[:, size:], strict=True):
+        part = own * (partner @ pushed) / (1j * frequency - value)
+        part += other * (partner.conj() @ pushed) / (1j * frequency - np.conj(value))
         found.append((abs(value) / (2.0 * np.pi), _share(complex(part), total)))
     return tuple(sorted((share for share in found if abs(share[1]) >= LEAST_MODE), key=lambda share: -abs(share[1])))
 

@@ -184,6 +184,9 @@ def _attributes(response: SteadyResponse) -> dict[str, Any]:
         "change_with_more": response.change_with_more,
         "shared_lines": "; ".join(_shared(row, response.base_names) for row in response.lines.shared(unrelated)),
         "contributions": json.dumps([{"line": line, **asdict(parts)} for line, parts in response.contributions]),
+        "sound_contributions": json.dumps(
+            [{"line": line, **asdict(parts)} for line, parts in response.sound_contributions]
+        ),
         "folds": json.dumps(response.folds),
         "branch_ended": response.branch_ended,
         "not_converged": json.dumps([{"speed": speed, "reason": reason} for speed, reason in response.unsolved]),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from functools import partial
@@ -13,7 +13,9 @@ import numpy as np
 
 from exugear.gearbox.load_cases import operating_range
 from exugear.gearbox.units import RPM
-from exugear.results.sound.radiated_power import RadiatedPower
+from exugear.results.sound.levels import a_weighted
+from exugear.results.sound.over_speed import line_frequencies
+from exugear.results.sound.radiated_power import RadiatedPower, equivalent_power
 from exugear.steady.balance.excitation import HarmonicBalanceModel
 from exugear.steady.balance.neighbours import judged_speeds, with_needed_neighbours
 from exugear.steady.balance.nonlinear import HarmonicResidual, Tangent, growth_of_state, turned_balance
@@ -37,7 +39,7 @@ from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
 from exugear.steady.harmonics.lines import LineSet
 from exugear.steady.mean_system.mesh_places import DEFLECTION
 from exugear.steady.mean_system.planet_sets import SteadyError
-from exugear.steady.mean_system.signals import SignalName
+from exugear.steady.mean_system.signals import SURFACE_VELOCITY, SignalName
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.settings import (
     SteadySettings,
@@ -216,6 +218,8 @@ class SteadyResponse(ReprMixin):
     """Where lines meet modes, the strongest first."""
     contributions: tuple[tuple[int, Contributions], ...]
     """Line and what makes it, at the strongest crossings."""
+    sound_contributions: tuple[tuple[int, Contributions], ...]
+    """Line and what makes its sound power, of the loudest lines at the loudest speed."""
     folds: tuple[float, ...]
     """Speeds at which a branch turns back, rad/s."""
     branch_ended: str
@@ -281,6 +285,8 @@ class SteadyResponse(ReprMixin):
 CHECKED, MORE = 10, 1.5
 """Number of highest peaks that are recomputed, and the factor on the number of harmonics."""
 PEAKS_WITH_CONTRIBUTIONS = 20
+LINES_WITH_CONTRIBUTIONS = 5
+"""Loudest lines whose sound power is explained."""
 """Crossings whose peaks are taken apart."""
 ROUNDS = 5
 """Times that tops, and then speeds on flanks, are looked for between speeds, at most."""
@@ -375,6 +381,7 @@ def response_of(
         unsolved=tuple(zip(points.speed[~is_solved].tolist(), points.remark[~is_solved].tolist(), strict=True)),
         crossings=found,
         contributions=tuple(explained),
+        sound_contributions=tuple(_sound_contributions(linear, solved, operation)),
         folds=folds,
         branch_ended=ended,
         growth_rate=float(np.fmax.reduce(solved.growth, initial=growth)),
@@ -388,6 +395,28 @@ def response_of(
         band=band,
         campbell=campbell_of(linear.system, tracks),
     )
+
+
+def _sound_contributions(
+    model: HarmonicBalanceModel, solved: SolvedPoints, operation: tuple[float, float] | None
+) -> Iterator[tuple[int, Contributions]]:
+    """Yield the loudest lines at the loudest speed in operation, A-weighted, and what makes them."""
+    radiated = model.radiated
+    if radiated is None or model.loses_contact:
+        return
+    velocity = np.abs(solved.amplitude[..., model.signal_names.index(SURFACE_VELOCITY)]).astype(np.float64)
+    frequency = line_frequencies(solved.speed, model.lines.orders)
+    power = a_weighted(equivalent_power(velocity, radiated.area), frequency)
+    power[frequency > radiated.limit] = 0.0
+    in_operation = np.abs(solved.speed) >= 0.0
+    if operation is not None:
+        low, high = operation
+        in_operation = (np.abs(solved.speed) >= low) & (np.abs(solved.speed) <= high)
+    point = int(np.argmax(np.where(in_operation, power.sum(axis=1), -1.0)))
+    for line in np.argsort(-power[point], kind="stable")[:LINES_WITH_CONTRIBUTIONS].tolist():
+        # Combinations of several bases are no sum over meshes.
+        if power[point, line] > 0.0 and np.count_nonzero(model.lines.index[line]) == 1:
+            yield line, contributions(model.frozen, float(solved.speed[point]), line, model.frozen.radiated)
 
 
 def _tracks(model: HarmonicBalanceModel, speeds: Floats) -> ModeTracks:

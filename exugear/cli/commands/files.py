@@ -193,9 +193,23 @@ def export(
             show_default=False,
         ),
     ] = None,
+    surface: Annotated[
+        Path | None,
+        typer.Option(
+            "--surface",
+            metavar="FILE.nc",
+            help="Write velocities of a steady-state response on the housing's surface instead (netCDF, VTK).",
+            show_default=False,
+        ),
+    ] = None,
     speed: Annotated[
         float | None,
-        typer.Option("--speed", metavar="RPM", help="Input speed of loads as Nastran cards.", show_default=False),
+        typer.Option(
+            "--speed",
+            metavar="RPM",
+            help="Input speed of loads as Nastran cards, or of velocities.",
+            show_default=False,
+        ),
     ] = None,
     form: Annotated[
         Literal["npz", "csv", "mtx", "op4", "dmig"],
@@ -228,7 +242,7 @@ def export(
     whole: options.AllOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Write results into a copy of a REXS file, or matrices or loads.
+    """Write results into a copy of a REXS file, or matrices, loads or velocities.
 
     In a REXS file, geometry and static forces are always written; tables, modes, bearings and runs if the results
     folder has them. Use --shifts and --distances of the import.
@@ -245,8 +259,15 @@ def export(
 
         export_loads(case, loads, speed, units, to, allow_dir, as_json, whole)
         return
+    if surface is not None:
+        from exugear.cli.tasks.export import export_surface
+
+        export_surface(case, surface, speed, to, out, allow_dir, scripts, as_json, whole)
+        return
     if rexs is None:
-        raise BadInputError("nothing to export; name a REXS file, a body with --matrices BODY, or --loads FILE.nc")
+        raise BadInputError(
+            "nothing to export; name a REXS file, a body with --matrices BODY, --loads FILE.nc or --surface FILE.nc"
+        )
     from exugear.cli.tasks.rexs import export_rexs
     from exugear.exchange.rexs.to_case.notes import Rules
 

@@ -1,7 +1,8 @@
-"""The command `export` for other finite-element programs: matrices of a flexible body, and loads on the housing."""
+"""The command `export` for other programs: matrices of a body, loads on the housing, velocities of its surface."""
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -14,10 +15,14 @@ from exugear.cli.watched import open_project
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
+from exugear.report.findings.context import choice_of
 from exugear.results.findings import Finding
 from exugear.results.interface_loads import interface_loads, loaded_seats, loads_csv, nastran_loads
 from exugear.results.sound.radiated_power import radiating_names
-from exugear.steady.steady_file import load_response
+from exugear.results.sound.surface_velocity import surface_velocities, vtk_file
+from exugear.steady.evaluation.deflection_shapes import motion_at
+from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
+from exugear.steady.steady_file import load_response, settings_of
 from exugear.system.bearings.stiffness import elastic_names
 from exugear.system.bodies.external import interface_of
 from exugear.system.bodies.matrix_files.files import MatrixFormat, file_contents, keys_of
@@ -144,6 +149,72 @@ def export_loads(
             "seats": rows,
         },
         findings=list(_left_out(gearbox, str(data.attrs["mesh_model"]), numbers)),
+        path=folder / names[-1],
+    ).show(as_json, whole)
+
+
+def export_surface(
+    case: Path,
+    response: Path,
+    speed: float | None,
+    to: Path | None,
+    out: Path | None,
+    allow_dir: Path | None,
+    scripts: bool,
+    as_json: bool,
+    whole: bool,
+) -> None:
+    """Write the velocities on the surface of flexible housings at a speed, as netCDF and as VTK file."""
+    if speed is None:
+        raise BadInputError("--surface: name a computed speed with --speed RPM")
+    folder = to or response.parent
+    names = [f"{response.stem}-surface.{ending}" for ending in ("nc", "vtu")]
+    _refuse_existing(folder, names)
+    try:
+        data = load_response(response)
+    except FileError as error:
+        raise BadInputError(f"--surface {error}; name a file that exugear steady has written") from error
+    choice = choice_of(data.attrs)
+    point = _nearest(data["speed"].to_numpy(), speed)
+    variant = Variant.of(choice.variant)
+    project = open_project(case, out, allow_dir, scripts, variant, choice.mesh_model, choice.inertias)
+    if not radiating_names(project.gearbox, variant):
+        raise BadInputError(f"--surface {response}: no flexible housing; compute the response with --variant flexible")
+    project.begin()
+    assembly = project.assembly()
+    if settings_of(data.attrs).hash_with(assembly) != data.attrs["input_hash"]:
+        raise BadInputError(f"--surface {response}: computed from another gearbox file or tables; compute it again")
+    at = float(data["speed"].to_numpy()[point])
+    try:
+        motion = motion_at(assembly, data, at)
+    except HarmonicBalanceError as error:
+        raise BadInputError(f"--surface {response}: at {at / RPM:.6g} rpm {error}; choose another --speed") from error
+    bodies = {name: body.reduced for name, body in assembly.elastic_bodies.items()}
+    surfaces = {name: body.surface for name, body in bodies.items() if body.radiating is not None}
+    orders = data["order"].to_numpy()
+    heard = np.flatnonzero(orders > 0.0)
+    velocities = surface_velocities(
+        surfaces,
+        {name: motion[heard][:, assembly.elastic_slices[name]] for name in surfaces},
+        np.abs(at * orders[heard]) / (2.0 * np.pi),
+        [str(data["line"].to_numpy()[line]) for line in heard],
+        at,
+    )
+    content = io.BytesIO()
+    velocities.to_netcdf(content, engine="h5netcdf")
+    write_together(folder, dict(zip(names, (content.getvalue(), vtk_file(velocities)), strict=True)))
+    points = velocities.sizes["point"]
+    Outcome(
+        verdict=f"{points} points of {', '.join(surfaces)}, {len(heard)} orders at {at / RPM:.6g} rpm",
+        summary={
+            "case": project.gearbox.source,
+            "response": str(response),
+            "speed_rpm": at / RPM,
+            "bodies": list(surfaces),
+            "points": points,
+            "orders": len(heard),
+            "files": [str(folder / name) for name in names],
+        },
         path=folder / names[-1],
     ).show(as_json, whole)
 

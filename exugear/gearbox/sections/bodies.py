@@ -138,7 +138,22 @@ class SolidSeatSection(Section):
         return self
 
 
-class SolidSection(Section):
+class DampedBodySection(Section):
+    """Damping of one flexible body: keys of `solid` and `external`."""
+
+    loss_factor: q.LossFactor | None = None
+    """Structural damping of a fixed body: each free mode has the damping ratio loss_factor / 2."""
+    damping_time_s: q.DampingTimeS | None = None
+    """Ratio of damping to stiffness of this body; by default that of `damping.body_time_s`."""
+
+    @model_validator(mode="after")
+    def _either(self) -> DampedBodySection:
+        if self.loss_factor is not None and self.damping_time_s is not None:
+            raise ValueError("set either loss_factor or damping_time_s")
+        return self
+
+
+class SolidSection(DampedBodySection):
     """A body of arbitrary shape from a file in the folder of the gearbox file, in the axes of the gearbox.
 
     Geometry (.step, .stp, .brep, or the script .geo, which needs permission to run) is meshed with tetrahedra by gmsh;
@@ -195,7 +210,7 @@ class ExternalSeatSection(Section):
         return self
 
 
-class ExternalSection(Section):
+class ExternalSection(DampedBodySection):
     """A body of another finite-element program as mass and stiffness matrices on interface nodes.
 
     The files are in the folder of the gearbox file: one with both matrices, or `stiffness` and `mass`; formats follow
@@ -236,17 +251,11 @@ class ExternalSection(Section):
     """Mass according to the other program, which is compared."""
     stated_centre_mm: Point | None = None
     """Centre of mass according to the other program in the axes of the files, which is compared."""
-    loss_factor: q.LossFactor | None = None
-    """Structural damping of a fixed body: each free mode has the damping ratio loss_factor / 2."""
-    damping_time_s: q.DampingTimeS | None = None
-    """Ratio of damping to stiffness of this body; by default that of `damping.body_time_s`."""
     seats: dict[Name, ExternalSeatSection] = {}
     """Seats by gear, bearing or mount."""
 
     @model_validator(mode="after")
     def _files(self) -> ExternalSection:
-        if self.loss_factor is not None and self.damping_time_s is not None:
-            raise ValueError("set either loss_factor or damping_time_s")
         apart = (self.stiffness is not None, self.mass is not None)
         if self.file is not None and any(apart):
             raise ValueError("set either file, or stiffness and mass")
@@ -305,10 +314,11 @@ class BodySection(Section):
             raise ValueError(
                 "flexibility 'ffrf' requires mass integrals, which matrices on nodes do not have; set 'elastic'"
             )
-        if self.external is not None and self.external.loss_factor is not None and not self.fixed:
-            raise ValueError(
-                "external.loss_factor: damping ratios of single modes are for a fixed body; set damping_time_s"
-            )
+        for key, part in (("solid", self.solid), ("external", self.external)):
+            if part is not None and part.loss_factor is not None and not self.fixed:
+                raise ValueError(
+                    f"{key}.loss_factor: damping ratios of single modes are for a fixed body; set damping_time_s"
+                )
         if self.external is not None and (self.spin_only or self.carrier is not None):
             raise ValueError(
                 "external matrices are for a body on a fixed axis or a fixed body, not a spin-only or planet body; "

@@ -28,6 +28,8 @@ RADIUS = 8.0
 """Radius of a circle with a number."""
 NARROWEST = 1e-3
 """Minimum length of an axis of speeds, relative to its beginning or in rpm."""
+MOST_DECADES = 4
+"""Most ticks of a logarithmic axis with powers of ten."""
 TICKS = 7
 """Approximate number of ticks of an axis."""
 HEADROOM = 1.3
@@ -221,11 +223,17 @@ def _free(x: float, y: float, text: str, taken: Sequence[Mark]) -> Mark:
 
 
 def _decades(low: float, high: float) -> list[float]:
-    """Return the ticks of a logarithmic axis: powers of ten, and if these are few, also 2 and 5 times them."""
+    """Return the ticks of a logarithmic axis: powers of ten, and if these are few, also 2 and 5 times them.
+
+    Examples
+    --------
+    >>> _decades(0.3, 30.0), _decades(1e-3, 1e7)
+    ([0.5, 1.0, 2.0, 5.0, 10.0, 20.0], [0.001, 1.0, 1000.0, 1000000.0])
+    """
     powers = [10.0**n for n in range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)]
     ticks = [power for power in powers if low <= power <= high]
     if len(ticks) > 2:
-        return ticks
+        return ticks[:: -(-len(ticks) // MOST_DECADES)]
     return [factor * power for power in powers for factor in (1.0, 2.0, 5.0) if low <= factor * power <= high]
 
 

@@ -29,8 +29,10 @@ from exugear.report.pictures.still import mode_picture
 from exugear.report.sections.changes import CHANGES_NAME, best_changes, levers_command, study_of
 from exugear.report.sections.material import Part, ReportData
 from exugear.report.sections.resonances import SHOWN, note_of, sorted_quantities
+from exugear.report.sections.sound import loudest
 from exugear.report.web.html import render
 from exugear.report.web.stage import drawn_bodies, drawn_mode
+from exugear.results.sound.over_speed import sound_over_speed
 from exugear.steady.crossings import Contributions
 from exugear.steady.findings import NOTICED_SHUTTLING
 from exugear.system.modal_damping import damping_in_words
@@ -328,6 +330,10 @@ def _further(
     rated = material.context.gearbox.case.operation.rated_speed_rpm
     if rated is not None and curves:
         yield f"At rated speed, {rounded_text(rated)} rpm", _rated_lines(headline, curves, rated)
+    if headline.response is not None and (sound := sound_over_speed(headline.response)) is not None:
+        sound = sound.inside(headline.ranking.speeds)
+        if sound.speed.size and (found := sound.summary())["orders"]:
+            yield "Sound power of the housing", [loudest(found, material)]
     outside = headline.outside()
     lines = []
     if outside is not None:

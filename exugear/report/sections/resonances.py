@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +26,9 @@ from exugear.report.pictures.speed_diagrams import NUMBERED, CampbellDrawing, ca
 from exugear.report.sections.material import ChartAxis, Curve, Part, ReportData, model_name
 from exugear.report.sections.measured import measured_run_ups
 from exugear.report.sections.run_data import is_found_always
+from exugear.report.sections.sound import sound_power
 from exugear.report.web.html import Cell, Figure, Table, render
+from exugear.results.causes import shares, strongest
 from exugear.results.run_file import read_run
 from exugear.results.spectra.resonances import MAX_SWEEP_RATIO, run_up_cut, sweep_rate, sweep_severity
 from exugear.results.spectra.run_spectra import WINDOW_FACTORS, AbsenceRule, VariantRun, report_mode
@@ -377,8 +379,6 @@ def _note_growth(material: ReportData) -> None:
 
 PEAKS = 20
 """Number of peaks that are compared with run-ups, and listed of a continuation."""
-LEAST_SHARE, SHOWN_CONTRIBUTIONS = 0.05, 3
-"""Minimum listed contribution to a resonance, and maximum number of contributions."""
 NOTICED_RANGE = 0.01
 """Range of a natural frequency over the angle of the carrier, over it, from which it is drawn."""
 STRONG = 0.1
@@ -442,6 +442,7 @@ def _response(material: ReportData, data: xr.Dataset) -> dict[str, Any]:
         ),
         "contributions": _contributions_table(material, data, f"made-by-{name}"),
         "campbell": _campbell(material, data, f"campbell-{name}", label),
+        "sound": sound_power(material, data, f"sound-{name}"),
         "ranges": [
             f"{load_case}: {slow / RPM:.4g} to {fast / RPM:.4g} rpm"
             for load_case, (slow, fast) in _ranges(context).items()
@@ -492,11 +493,11 @@ def _contributions_table(material: ReportData, data: xr.Dataset, name: str) -> T
             {
                 "order": labelled(line_name(tuple(int(n) for n in index[line]), bases)),
                 "speed / rpm": f"{speed / RPM:.2f}",
-                "excited by": labelled(_shares(peak["meshes"].items())),
-                "of this, moment of the shuttling load": labelled(_shares(peak.get("shuttling", {}).items())) or "–",
-                "responding modes": _shares((f"{frequency:.1f} Hz", share) for frequency, share in peak["modes"]),
-                "sensitivity to stiffness of": labelled(_slopes_of(peak["supports"])),
-                "sensitivity to inertia of": labelled(_slopes_of(peak["bodies"])),
+                "excited by": labelled(shares(peak["meshes"].items())),
+                "of this, moment of the shuttling load": labelled(shares(peak.get("shuttling", {}).items())) or "–",
+                "responding modes": shares((f"{frequency:.1f} Hz", share) for frequency, share in peak["modes"]),
+                "sensitivity to stiffness of": labelled(strongest(peak["supports"])),
+                "sensitivity to inertia of": labelled(strongest(peak["bodies"])),
             }
         )
     texts = (
@@ -668,16 +669,6 @@ def _carriers(context: Context) -> dict[str, tuple[str, float]]:
     speeds = gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
     own = {mesh.family: mesh.frame for mesh in gearbox.meshes if mesh.frame != GROUND}
     return {family: (frame, speeds[frame]) for family, frame in own.items() if speeds.get(frame)}
-
-
-def _shares(parts: Iterable[tuple[str, float]]) -> str:
-    entries = [f"{name} {100.0 * share:.0f} %" for name, share in parts if abs(share) >= LEAST_SHARE]
-    return ", ".join(entries[:SHOWN_CONTRIBUTIONS])
-
-
-def _slopes_of(slopes: Mapping[str, float]) -> str:
-    strongest = sorted(slopes.items(), key=lambda item: -abs(item[1]))[:SHOWN_CONTRIBUTIONS]
-    return ", ".join(f"{name} {slope:+.2f}" for name, slope in strongest)
 
 
 def _place(data: xr.Dataset, line: OrderLine) -> int | None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -89,6 +90,8 @@ class SoundOverSpeed:
     """(points, lines) W; not a number above the limit."""
     surface: Mapping[str, Any]
     """Bodies, areas and limit, as `surface_words` has them."""
+    contributions: tuple[Mapping[str, Any], ...] = ()
+    """What makes the loudest orders at the loudest speed: `exugear.steady.crossings.Contributions` with their line."""
 
     @property
     def frequency(self) -> Floats:
@@ -103,7 +106,7 @@ class SoundOverSpeed:
     def inside(self, speeds: tuple[float, float]) -> SoundOverSpeed:
         """Return the part between two absolute speeds, rad/s."""
         chosen = (self.speed >= speeds[0]) & (self.speed <= speeds[1])
-        return SoundOverSpeed(self.speed[chosen], self.orders, self.names, self.power[chosen], self.surface)
+        return replace(self, speed=self.speed[chosen], power=self.power[chosen])
 
     def orders_left_out(self) -> tuple[tuple[str, float], ...]:
         """Orders that exceed the limit at the highest speed, by name, and their frequency there (Hz), lowest first."""
@@ -135,8 +138,21 @@ class SoundOverSpeed:
                 for centre, own in zip(nominal_frequency(numbers), power_level(bands).T, strict=True)
                 if own[0] > power_level(np.zeros(1))[0]
             ],
+            "contributions": list(self._contributions(float(self.speed[point]))),
             "left_out": [{"line": name, "frequency_Hz": frequency} for name, frequency in self.orders_left_out()],
         }
+
+    def _contributions(self, speed: float) -> Iterator[dict[str, Any]]:
+        """Yield what makes the loudest orders, if they are explained at this speed."""
+        for own in self.contributions:
+            if math.isclose(abs(own["speed"]), speed, rel_tol=1e-9):
+                yield {
+                    "line": self.names[own["line"]],
+                    "frequency_Hz": float(speed * self.orders[own["line"]] / (2.0 * np.pi)),
+                    "meshes": own["meshes"],
+                    "modes": own["modes"],
+                    "supports": own["supports"],
+                }
 
 
 def _levels(levels: Floats) -> dict[str, float]:
@@ -158,4 +174,5 @@ def sound_over_speed(data: xr.Dataset) -> SoundOverSpeed | None:
         names=tuple(str(name) for name in data["line"].to_numpy()),
         power=data["sound_power"].to_numpy(),
         surface=json.loads(str(data.attrs["radiating_surface"])),
+        contributions=tuple(json.loads(str(data.attrs["sound_contributions"]))),
     )

@@ -66,6 +66,27 @@ class RadiatedPower:
         square = np.square(normal.real).sum(axis=1) + np.square(normal.imag).sum(axis=1)
         return np.asarray(np.abs(frequencies) * np.sqrt(square / self.area))
 
+    def row_along(self, motion: Complexes, frequency: float) -> Complexes:
+        """Row (n,) whose product with a motion is its part of the surface velocity of another motion, m/s.
+
+        The product with this other motion itself is its surface velocity, which `surface_velocity` gives.
+
+        Parameters
+        ----------
+        motion : (n,) the other motion
+        frequency : angular frequency, rad/s
+
+        Examples
+        --------
+        >>> piston = RadiatedPower(np.array([[np.sqrt(0.5)]]), ("piston",), 0.5, 0.5, 20.0)
+        >>> row = piston.row_along(np.array([1e-3j]), 100.0)
+        >>> [round(float((row @ np.array([part])).real), 12) for part in (1e-3j, 1e-3)]
+        [0.1, 0.0]
+        """
+        normal = self.rows @ motion
+        along = normal.conj() / np.linalg.norm(normal)
+        return np.asarray(abs(frequency) / np.sqrt(self.area) * (along @ self.rows), dtype=np.complex128)
+
     def in_frame(self, transformation: Floats) -> RadiatedPower:
         """Return the same by other coordinates u (k,), of which the gearbox's are a transformation (n, k)."""
         return RadiatedPower(self.rows @ transformation, self.bodies, self.area, self.whole_area, self.limit)

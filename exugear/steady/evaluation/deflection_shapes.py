@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from exugear.steady.balance.response import signals
+from exugear.steady.balance.excitation import HarmonicBalanceModel
+from exugear.steady.balance.response import Response, signals
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.steady_file import settings_of
@@ -49,9 +50,7 @@ def deflection_shapes(
     (size,) complex peak amplitude of each coordinate, m and rad; None where the stored state is not found again.
     """
     settings = settings_of(data.attrs)
-    reach = settings.harmonics, settings.combinations
-    model = harmonic_balance_model(assembly, settings.speeds.values, *reach, settings.method)
-    turned = model.system.frame.matrices(0.0)[0]
+    model = _model_of(assembly, data)
     shapes: list[Complexes | None] = []
     for order, speed in resonances:
         solver = PointSolver(model, settings.method)
@@ -67,7 +66,37 @@ def deflection_shapes(
         if abs(amplitude - stored) > SAME_STATE * stored:
             shapes.append(None)
             continue
-        shape = 2.0 * turned @ response.motion[line]
-        # Coefficients go with the angle of the input, which decreases in time at a negative speed.
-        shapes.append(np.conj(shape) if speed < 0.0 else shape)
+        shapes.append(_amplitudes(model, response, speed)[line])
     return shapes
+
+
+def motion_at(assembly: Assembly, data: xr.Dataset, speed: float) -> Complexes:
+    """Peak amplitudes (lines, size) of all coordinates in all orders of a response at one of its speeds (rad/s).
+
+    Raises
+    ------
+    HarmonicBalanceError
+        The state is not found again from rest, or another one is.
+    """
+    settings = settings_of(data.attrs)
+    model = _model_of(assembly, data)
+    solver = PointSolver(model, settings.method)
+    response = solver.response(speed)
+    point = int(np.argmin(np.abs(data["speed"].to_numpy() - speed)))
+    found = 2.0 * np.abs(signals(solver.model, response)[1:, 0])
+    stored = np.abs(data["amplitude"].to_numpy()[point, 1:, 0])
+    if len(found) != len(stored) or np.linalg.norm(found - stored) > SAME_STATE * np.linalg.norm(stored):
+        raise HarmonicBalanceError("another state than the stored one is found at this speed")
+    return _amplitudes(model, response, speed)
+
+
+def _model_of(assembly: Assembly, data: xr.Dataset) -> HarmonicBalanceModel:
+    settings = settings_of(data.attrs)
+    reach = settings.harmonics, settings.combinations
+    return harmonic_balance_model(assembly, settings.speeds.values, *reach, settings.method)
+
+
+def _amplitudes(model: HarmonicBalanceModel, response: Response, speed: float) -> Complexes:
+    shapes: Complexes = 2.0 * response.motion @ model.system.frame.matrices(0.0)[0].T
+    # Coefficients go with the angle of the input, which decreases in time at a negative speed.
+    return shapes.conj() if speed < 0.0 else shapes

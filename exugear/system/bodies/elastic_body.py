@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from exugear.gearbox.sections.bodies import DampedBodySection
 from exugear.system.bodies.reduction import ReducedBody, ReductionError, RigidInertia
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
 from fe_ste.tools.arrays import Complexes, Floats
@@ -102,6 +103,12 @@ class ElasticBody(ReprMixin):
         more = f", {len(self.sectors)} gears on sectors" if self.sectors else ""
         frame = ", floating frame" if self.floating is not None else ""
         return f" of {self.reduced!r}: main seat {self.main_seat}{more}{frame}"
+
+
+def stated_damping(section: DampedBodySection) -> tuple[float | None, float]:
+    """Damping time (s) and loss factor of a body, of which the file states one at most; as `ElasticBody` has them."""
+    damping_time, loss_factor = section.damping_time_s, section.loss_factor
+    return (damping_time, 0.0) if loss_factor is None else (0.0, loss_factor)
 
 
 IDENTITY = np.eye(3)

@@ -14,6 +14,7 @@ from exugear.gearbox.parts import Body
 from exugear.gearbox.sections.bodies import ExternalSeatSection, ExternalSection
 from exugear.gearbox.units import DEG, MM
 from exugear.system.bearings.stiffness import elastic_names
+from exugear.system.bodies.elastic_body import stated_damping
 from exugear.system.bodies.external import SAME_PLACE, ExternalModel, NodeSeat, matrices_of, placed_matrices
 from exugear.system.bodies.matrix_files.checks import MatrixReview
 from exugear.system.bodies.matrix_files.files import Kind, MatrixFiles
@@ -86,10 +87,7 @@ def external_body(gearbox: Gearbox, name: str) -> ExternalBody:
         band=external.band_Hz or gearbox.case.elasticity.band_Hz,
         axis=body.axis,
     )
-    damping_time, loss_factor = external.damping_time_s, external.loss_factor or 0.0
-    if loss_factor:
-        damping_time = 0.0
-    return ExternalBody(model, external.torque_seat or names[0], sectors, shared, damping_time, loss_factor)
+    return ExternalBody(model, external.torque_seat or names[0], sectors, shared, *stated_damping(external))
 
 
 def _files(gearbox: Gearbox, key: str, external: ExternalSection) -> MatrixFiles:

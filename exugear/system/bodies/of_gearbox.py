@@ -27,7 +27,7 @@ from exugear.gearbox.sections.bodies import (
 from exugear.gearbox.sections.gears import MaterialSection
 from exugear.gearbox.units import MM, optional_si, si
 from exugear.system.bearings.stiffness import elastic_names, mounts_at_work
-from exugear.system.bodies.elastic_body import ElasticBody, FloatingBody
+from exugear.system.bodies.elastic_body import ElasticBody, FloatingBody, stated_damping
 from exugear.system.bodies.external import ExternalModel, placed_matrices, reduce_external
 from exugear.system.bodies.external_of_gearbox import ExternalBody, check_external, external_body
 from exugear.system.bodies.matrix_files.interface import MatrixFileError
@@ -243,7 +243,9 @@ class SolidBody:
     main_seat: str
     sectors: Mapping[str, tuple[str, ...]]
     shared_seats: Mapping[str, str]
-    """As in `exugear.system.bodies.of_gearbox.ElasticBody`."""
+    damping_time: float | None
+    loss_factor: float
+    """As in `exugear.system.bodies.elastic_body.ElasticBody`."""
 
 
 def solid_body(gearbox: Gearbox, name: str) -> SolidBody:
@@ -297,7 +299,7 @@ def solid_body(gearbox: Gearbox, name: str) -> SolidBody:
         blanks=_solid_blanks(gearbox, body, solid, names),
         axis=body.axis,
     )
-    return SolidBody(model, solid.torque_seat or names[0], sectors, shared)
+    return SolidBody(model, solid.torque_seat or names[0], sectors, shared, *stated_damping(solid))
 
 
 def _solid_seats(
@@ -488,9 +490,7 @@ def _elastic_body(gearbox: Gearbox, body: Body, folder: Path | None) -> ElasticB
     inertia = of_shape.rigid_inertia
     if seated is not None:
         found = ElasticBody(reduced, inertia, seated.main_seat, seated.sectors, seated.shared_seats, floating, digest)
-        if isinstance(seated, ExternalBody):
-            found = replace(found, damping_time=seated.damping_time, loss_factor=seated.loss_factor)
-        return found
+        return replace(found, damping_time=seated.damping_time, loss_factor=seated.loss_factor)
     seats = [seat.name for seat in of_shape.seats]
     shared = shared_seats(gearbox, body.name)
     torque = shared.get(TORQUE_SEAT, TORQUE_SEAT)

@@ -187,7 +187,7 @@ def _with_box() -> dict[str, Any]:
         "flexibility": "elastic",
         "solid": {
             "file": "plate.vtu", "band_Hz": 4000.0, "length_unit_mm": 1.0, "element_size_mm": 5.0,
-            "elements_around": 12,
+            "elements_around": 12, "loss_factor": 0.02,
             "seats": {"bearing_1": face, "bearing_2": face, "foot": {**face, "position_mm": [50.0, 0.0, -12.0]}},
         },
     }  # fmt: skip

@@ -75,6 +75,12 @@ def test_the_sound_power_of_a_flexible_housing_follows_the_verdict_with_its_limi
     assert sum(10.0 ** (0.1 * own["level_dBA"]) for own in sound["orders"]) == pytest.approx(
         10.0 ** (0.1 * sound["level_dBA"]), rel=1e-9
     )
+    assert "Contributions to the sound power of the loudest orders at" in outcome.stdout
+    said = json.loads(exugear("report", tmp_path / "out", "--json").stdout)["statements"]
+    (line,) = [own for own in said if own.startswith("Sound power of the housing")]
+    assert f"{sound['level_dBA']:.1f} dB(A), upper estimate, at {sound['speed_rpm']:.0f} rpm" in line
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert all(f"{own['level_dB']:.1f}" in page and f"{own['level_dBA']:.1f}" in page for own in sound["orders"])
 
 
 @pytest.mark.validation

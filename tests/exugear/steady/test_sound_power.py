@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import math
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +19,8 @@ from exugear.report.findings.ranking import ranking_of
 from exugear.results.sound.levels import a_weighting, power_level
 from exugear.results.sound.over_speed import sound_over_speed
 from exugear.results.sound.radiated_power import AIR_IMPEDANCE, radiated_power
-from exugear.steady.balance.response import signals
+from exugear.steady.balance.response import signals, transmission_errors
+from exugear.steady.crossings import contributions
 from exugear.steady.findings import UPPER_ESTIMATE, response_findings
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.settings import SpeedRange, SteadySettings
@@ -29,6 +33,7 @@ from exugear.transient.compiled.solver import CompiledSystem
 from ...optional_libraries import needs_meshio
 from ..cases.assembled import assembled
 from ..cases.box import box_content
+from ..cases.case_mutations import toml_text
 from ..cases.command import exugear
 from ..cases.spur import SPUR_CASE
 
@@ -116,10 +121,108 @@ def test_the_loudest_speed_is_said_with_its_loudest_order(data):
     line = sound_line(summary)
     assert f"{summary['level_dBA']:.1f} dB(A), upper estimate" in line
     assert first["line"].replace(" x ", " × ") in line
-    orders, bands = sound_tables(summary)
+    orders, bands, causes = sound_tables(summary)
     assert len(orders.rows) == 5
+    assert [row["line"] for row in causes.rows] == [row["line"] for row in orders.rows]
+    assert all(sum(row["meshes"].values()) == pytest.approx(1.0) for row in causes.rows)
     assert sum(10 ** (0.1 * row["level_dB"]) for row in bands.rows) == pytest.approx(10 ** (0.1 * summary["level_dB"]))
     assert json.dumps(summary)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_contributions_to_the_sound_power_add_up_to_it(housed, order):
+    """The velocity of the linear response, of which all meshes and all modes are parts."""
+    speed = 1500.0 * math.pi / 30.0
+    solver = PointSolver(harmonic_balance_model(housed, np.array([speed]), 10), "linear")
+    model = solver.model
+    line = int(np.flatnonzero(model.lines.index[:, 0] == order)[0])
+    found = contributions(model, speed, line, model.radiated)
+    known = 2.0 * abs(signals(model, solver.response(speed))[line, -1])
+    assert found.amplitude == pytest.approx(known, rel=1e-9)
+    assert sum(found.meshes.values()) == pytest.approx(1.0, abs=1e-9)
+    assert sum(share for _, share in found.modes) == pytest.approx(1.0, abs=0.05)
+
+
+def test_the_derivative_of_the_sound_power_is_that_of_a_gearbox_with_a_stiffer_bearing(housed):
+    """The excitation stays as it is: of a gearbox with a changed bearing only the averaged system is taken."""
+    speed = 1500.0 * math.pi / 30.0
+    model = harmonic_balance_model(housed, np.array([speed]), 10)
+    radiated = model.radiated
+    assert radiated is not None
+    line = int(np.flatnonzero(model.lines.index[:, 0] == 1)[0])
+    frequency = speed * float(model.lines.orders[line])
+    interface = model.at(speed)
+    loads = model.loads(interface.ports) @ transmission_errors(model, interface.ports, speed)[line].ravel()
+    derivative = contributions(model, speed, line, radiated).supports
+    name = max(derivative, key=lambda family: abs(derivative[family]))
+    own = np.array([support.family == name for support in housed.supports])
+    velocities = []
+    for factor in (1.001, 0.999):
+        changed = np.where(own, factor, 1.0)[:, None, None]
+        arrays = housed.connectors
+        arrays = arrays._replace(stiffness=arrays.stiffness * changed, damping=arrays.damping * changed)
+        other = harmonic_balance_model(replace(housed, connectors=arrays), np.array([speed]), 10)
+        motion = np.linalg.solve(other.system.dynamic(speed, frequency), loads)
+        velocities.append(float(radiated.surface_velocity(motion[None, :], np.array([frequency]))[0]))
+    slope = (velocities[0] - velocities[1]) / (0.001 * sum(velocities))
+    assert abs(slope) > 0.05
+    assert derivative[name] == pytest.approx(slope, rel=0.02, abs=0.02)
+
+
+@pytest.mark.validation
+def test_velocities_of_the_surface_for_other_programs_radiate_the_same_power(tmp_path):
+    """Their normal parts, integrated over the faces of the VTK file as another program reads it: 2 x 2 Gauss points.
+
+    The speed is solved again: iterations end at a thousandth of an order.
+    """
+    case = tmp_path / "box.toml"
+    case.write_text(toml_text(box_content(tmp_path)), encoding="utf-8")
+    out = tmp_path / "out"
+    options = ("--variant", "flexible", "--speeds", "1400:1600", "--points", "3", "--out", out)
+    file = Path(json.loads(exugear("steady", case, *options, "--json").stdout)["file"])
+    asked = ("export", case, "--surface", file, "--speed", 1500, "--out", out)
+    summary = json.loads(exugear(*asked, "--json").stdout)
+    dataset, drawn = (Path(name) for name in summary["files"])
+    mesh = importlib.import_module("meshio").read(drawn)
+    with xr.open_dataset(dataset, engine="h5netcdf") as found:
+        frequency, velocity = found["frequency"].to_numpy(), found["velocity"].to_numpy()
+    corners = mesh.points[mesh.cells_dict["quad"]]
+    sides = corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0]
+    normal = np.cross(*sides)
+    area = np.linalg.norm(normal, axis=1)
+    places = 0.5 + np.array([-0.5, 0.5]) / math.sqrt(3.0)
+    shapes = np.array([[(1 - a) * (1 - b), a * (1 - b), a * b, (1 - a) * b] for a in places for b in places])
+    power = []
+    for number, value in enumerate(frequency, start=1):
+        parts = [mesh.point_data[f"velocity_{number}_{value:.1f}Hz_{part}"] for part in ("real", "imaginary")]
+        assert np.array_equal(np.stack(parts), velocity[number - 1])
+        across = [np.einsum("fcd,fd->fc", part[mesh.cells_dict["quad"]], normal / area[:, None]) for part in parts]
+        square = sum(np.square(own @ shapes.T).mean(axis=1) @ area for own in across)
+        power.append(0.5 * AIR_IMPEDANCE * square)
+    stored = load_response(file)
+    point = int(np.argmin(np.abs(stored["speed_rpm"].to_numpy() - 1500.0)))
+    known = stored["sound_power"].to_numpy()[point, 1:]
+    counted = np.isfinite(known)
+    assert np.array(power)[counted] == pytest.approx(known[counted], rel=2e-3)
+    assert importlib.import_module("pyvista").read(drawn).n_points == summary["points"]
+    again = exugear(*asked)
+    assert again.exit_code == 2 and "exists already" in again.stderr
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ((), "name a computed speed with --speed RPM"),
+        (("--speed", 9000), "not computed; the response has"),
+    ],
+)
+def test_velocities_of_the_surface_need_a_computed_speed(tmp_path, more, said):
+    case = tmp_path / "box.toml"
+    case.write_text(toml_text(box_content(tmp_path)), encoding="utf-8")
+    options = ("--variant", "flexible", "--mesh-model", "iso6336", "--speeds", "1400:1600", "--points", "2")
+    file = Path(json.loads(exugear("steady", case, *options, "--out", tmp_path, "--json").stdout)["file"])
+    outcome = exugear("export", case, "--surface", file, "--out", tmp_path, *more)
+    assert outcome.exit_code == 2 and said in " ".join(outcome.stderr.split())
 
 
 def test_a_rigid_housing_has_no_sound_power(housed):

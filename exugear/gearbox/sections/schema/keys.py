@@ -80,10 +80,13 @@ def keys() -> Iterator[Key]:
 
 @cache
 def meanings(model: type[BaseModel]) -> Mapping[str, str]:
-    """Docstrings below the keys of a table, by key."""
+    """Docstrings below the keys of a table, by key; those of the table that it extends among them."""
+    texts: dict[str, str] = {}
+    for extended in model.__bases__:
+        if issubclass(extended, BaseModel) and extended.model_fields:
+            texts |= meanings(extended)
     body = ast.parse(inspect.getsource(model)).body[0]
     assert isinstance(body, ast.ClassDef)
-    texts = {}
     for statement, text in zip(body.body, body.body[1:], strict=False):
         if not (isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant)):
             continue

@@ -103,7 +103,7 @@ def test_a_file_gives_the_diagram_back(diagram, tmp_path, modes):
     diagram = replace(
         diagram,
         **{name: getattr(diagram, name)[:, kept] for name in ("frequency", "damping", "whirl")},
-        **{name: getattr(diagram, name)[kept] for name in ("kinds", "names")},
+        **{name: getattr(diagram, name)[kept] for name in ("over_angle", "kinds", "names")},
     )
     write_dataset(path, xr.Dataset(diagram.variables(), attrs={"method_version": 1}))
     found = campbell_from(load_dataset(path, Layout("diagram", 1, LAYOUT)))

@@ -760,7 +760,7 @@ def test_export_writes_what_the_gearbox_file_reads(tmp_path: Path) -> None:
     [
         (("--matrices", "lid"), "--matrices lid: no such flexible body; flexible bodies are box"),
         (("--matrices", "box", "file.rexs"), "--matrices box: omit file.rexs"),
-        ((), "nothing to export; name a REXS file, a body with --matrices BODY, or --loads FILE.nc"),
+        ((), "nothing to export; name a REXS file, a body with --matrices BODY, --loads FILE.nc or --surface FILE.nc"),
     ],
 )
 def test_an_export_that_cannot_be_is_refused_and_writes_nothing(

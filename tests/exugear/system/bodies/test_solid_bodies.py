@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.linalg
 import scipy.sparse
 import xarray as xr
 
@@ -343,3 +344,33 @@ def test_faults_name_body_key_and_what_would_be_right(tmp_path: Path, monkeypatc
 
     monkeypatch.setattr("exugear.system.bodies.solid_files.importlib.import_module", missing)
     refused({f"{solid}.length_unit_mm": 1.001}, r"meshio is not installed: pip install 'exugear\[mesh\]'")
+
+
+@pytest.mark.parametrize(
+    ("stated", "rates"),
+    [({"loss_factor": 0.04}, lambda w: 0.04 * w), ({"damping_time_s": 2e-6}, lambda w: 2e-6 * w**2)],
+)
+def test_a_solid_has_the_damping_that_its_keys_state(tmp_path, stated, rates):
+    """In each free mode of unit modal mass: eta w for structural damping, beta w^2 for C = beta K."""
+    content = box_content(tmp_path)
+    content["bodies"]["box"]["solid"] |= stated
+    content["damping"] = {"bearing_time_s": 0.0, "mesh_time_s": 0.0, "body_time_s": 5e-6}
+    gearbox = Gearbox.from_dict(content, str(tmp_path / "case.toml"))
+    assembly = assembled(gearbox, Choice("flexible"), {"spur": np.full(50, 3e8)})
+    at = assembly.elastic_slices["box"]
+    total = linearise(assembly, np.zeros(assembly.size)).total_damping[at, at]
+    body = assembly.elastic_bodies["box"].reduced
+    squares, shapes = scipy.linalg.eigh(body.stiffness, body.mass)
+    wanted = rates(np.sqrt(squares[6:]))
+    assert shapes[:, 6:].T @ total @ shapes[:, 6:] == pytest.approx(np.diag(wanted), abs=1e-6 * wanted.max())
+
+
+def test_damping_of_a_solid_is_stated_once_and_by_modes_only_of_a_fixed_body(tmp_path):
+    content = box_content(tmp_path)
+    content["bodies"]["box"]["solid"] |= {"loss_factor": 0.04, "damping_time_s": 1e-6}
+    with pytest.raises(GearboxFileError, match=r"bodies\.box\.solid.*set either loss_factor or damping_time_s"):
+        Gearbox.from_dict(content, str(tmp_path / "case.toml"))
+    del content["bodies"]["box"]["solid"]["damping_time_s"]
+    content["bodies"]["box"]["fixed"] = False
+    with pytest.raises(GearboxFileError, match=r"solid\.loss_factor: damping ratios of single modes"):
+        Gearbox.from_dict(content, str(tmp_path / "case.toml"))
