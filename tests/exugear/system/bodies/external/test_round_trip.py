@@ -145,3 +145,28 @@ def test_the_housing_of_the_grc_written_and_read_back_is_the_same_in_the_gearbox
     found = assembled(Gearbox.from_dict(content, str(tmp_path / "case.toml")), Choice("flexible"), stiffness)
     assert largest_change(found, wanted) < TOLERANCE.get(form, 1e-9)
     assert_sound_is_that_of(found, wanted)
+
+
+@pytest.mark.validation
+@needs_gmsh
+def test_the_carrier_of_the_grc_has_the_same_modes_through_every_form(
+    tmp_path: Path, grc: Gearbox, stiffness: dict[str, np.ndarray]
+) -> None:
+    """Planets on its pins, bearings and output: eigenfrequencies as before it was written, in the gearbox at rest."""
+    rigid = {f"bodies.{name}.flexibility": "none" for name in ("housing", "lss", "ims", "hss")}
+    wanted = assembled(grc.varied(rigid), Choice("flexible"), stiffness)
+    body = wanted.elastic_bodies["carrier"]
+    seats: dict[str, Any] = {seat.name: {"node": number} for number, seat in enumerate(body.reduced.seats, start=1)}
+    seats |= {name: {"same_as": other} for name, other in body.shared_seats.items()}
+    content = copy.deepcopy(dict(grc.varied(rigid).content))
+    torque_seat = content["bodies"]["carrier"].pop("solid").get("torque_seat")
+    frequency = modes_of(wanted).frequency
+    moving = frequency > 1.0
+    for form in get_args(MatrixFormat):
+        (tmp_path / form).mkdir()
+        keys = write(tmp_path / form, interface_of(body.reduced), form)
+        external = {**keys, "units": "SI", "seats": seats} | ({"torque_seat": torque_seat} if torque_seat else {})
+        content["bodies"]["carrier"]["external"] = external
+        gearbox = Gearbox.from_dict(content, str(tmp_path / form / "case.toml"))
+        found = modes_of(assembled(gearbox, Choice("flexible"), stiffness)).frequency
+        np.testing.assert_allclose(found[moving], frequency[moving], rtol=TOLERANCE.get(form, 1e-9), err_msg=form)
