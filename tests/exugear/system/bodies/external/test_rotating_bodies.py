@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ from exugear.gearbox.reading import GearboxFileError
 from exugear.steady.mean_system.mean_system import unsuitable
 from exugear.system.bodies.external import interface_of
 from exugear.system.bodies.external_of_gearbox import check_external, external_warnings
-from exugear.system.bodies.matrix_files.files import MatrixFiles, read_matrices
+from exugear.system.bodies.matrix_files.files import MatrixFiles, MatrixFormat, file_contents, keys_of, read_matrices
 from exugear.system.bodies.matrix_files.interface import InterfaceMatrices
 from exugear.system.bodies.matrix_files.plain import csv_matrix_content
 from exugear.system.bodies.reduction import ReducedBody
@@ -112,6 +112,31 @@ def test_a_gyroscopic_matrix_that_is_none_is_refused_with_the_place(
     with pytest.raises(GearboxFileError, match=message) as refused:
         check_external(gearbox, "shaft_1")
     assert len(refused.value.errors) == 1
+
+
+@pytest.mark.parametrize("form", get_args(MatrixFormat))
+def test_a_shaft_is_written_with_its_gyroscopic_matrix_and_a_housing_without(
+    tmp_path: Path, shaft: tuple[dict[str, Any], ReducedBody], box: InterfaceMatrices, form: MatrixFormat
+) -> None:
+    """In mm, t and s, and read back in SI units."""
+    body = shaft[1]
+    for name, written in file_contents(interface_of(body).from_si("mm-t-s"), "shaft", form).items():
+        (tmp_path / name).write_bytes(written)
+    keys = keys_of("shaft", form, with_gyroscopic=True)
+    content = copy.deepcopy(dict(shaft_of(tmp_path, shaft).content))
+    external = content["bodies"]["shaft_1"]["external"]
+    content["bodies"]["shaft_1"]["external"] = {
+        **keys, "units": "mm-t-s", "torque_seat": external["torque_seat"], "seats": external["seats"]
+    }  # fmt: skip
+    gearbox = Gearbox.from_dict(content, str(tmp_path / "case.toml"))
+    found = bodies_of(gearbox, Choice("flexible"))["shaft_1"].reduced
+    names = [seat.name for seat in found.seats]
+    seats = [names.index(seat.name) for seat in body.seats]
+    own = np.arange(len(body.mass))
+    own[: 6 * len(seats)] = (6 * np.array(seats)[:, None] + np.arange(6)).ravel()
+    largest = np.abs(body.gyroscopic).max()
+    np.testing.assert_allclose(found.gyroscopic[np.ix_(own, own)], body.gyroscopic, rtol=0.0, atol=1e-9 * largest)
+    assert box.gyroscopic is None
 
 
 @pytest.mark.parametrize("sense", [1.0, -1.0])
