@@ -31,6 +31,7 @@ from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.element import MeshCurve, MeshData
 from exugear.transient.runup import simulate
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.threads import one_dense_thread
 
 SPEEDS = "0:215:400"
 DISSIPATION = {
@@ -77,6 +78,7 @@ def dissipation_of(gearbox: Gearbox, speeds: SpeedRange, duration: float) -> dic
     return {**response, "run_up_s": run_up_of(gearbox, choice, curves, {}, duration)}
 
 
+@one_dense_thread()
 def excitations_of(gearbox: Gearbox, method: Method, count: int, speeds: Floats, rounds: int) -> dict[str, Any]:
     """Time per speed with torques on shafts and carrier, each of one order, variant bushing; the best of some rounds.
 
@@ -88,7 +90,7 @@ def excitations_of(gearbox: Gearbox, method: Method, count: int, speeds: Floats,
         for n in range(count)
     }
     assembly = assemble(gearbox.varied({"excitations": torques}), Choice("bushing"), stiffness_of(gearbox))
-    model = harmonic_balance_model(assembly, speeds)
+    model = harmonic_balance_model(assembly, speeds, method=method)
     best = np.full(len(speeds), np.inf)
     for _ in range(rounds):
         solver = PointSolver(model, method)

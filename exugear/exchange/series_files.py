@@ -11,12 +11,13 @@ times (int32); then the values step by step. Packed numbers are ``value * scale 
 from __future__ import annotations
 
 import csv
+import io
 import os
 import struct
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 
@@ -27,6 +28,9 @@ from fe_ste.tools.numbers import fortran_number
 
 # Lines of a text of any length, in blocks, so that no whole file is in memory
 
+_PLAIN = b"0123456789+-.eE "
+EXACT_PANDAS = (3, 1)
+"""Version of pandas from which its default reads decimal numbers exactly, and asking for that is deprecated."""
 BLOCK = 1_000_000
 """Number of bytes read at once."""
 LONGEST_LINE = 10_000_000
@@ -108,7 +112,7 @@ def numbers(
         first = number + 1
         number += len(lines)
         begin = max(0, skipped + 1 - first)
-        rows = table.parsed([line.decode("latin-1") for line in lines[begin:]], first + begin)
+        rows = table.parsed(lines[begin:], first + begin)
         some = some or bool(len(rows))
         if len(rows):
             yield rows
@@ -125,8 +129,12 @@ class _Table:
     separator: str | None
     wanted: tuple[int, ...]
 
-    def parsed(self, texts: list[str], first: int) -> Floats:
+    def parsed(self, lines: list[bytes], first: int) -> Floats:
         """Numbers of lines beginning with line number `first`; NaN for text in unused columns."""
+        found = self._plain_numbers(lines)
+        if found is not None:
+            return found
+        texts = [line.decode("latin-1") for line in lines]
         kept = [text for text in texts if text.strip()]
         if not kept:
             return np.zeros((0, len(self.headings)))
@@ -137,6 +145,24 @@ class _Table:
         except ValueError:
             pass
         return self._line_by_line(texts, first)
+
+    def _plain_numbers(self, lines: list[bytes]) -> Floats | None:
+        """Numbers of lines that have nothing but decimal numbers and separators; None for any others.
+
+        pandas reads them five times as fast as NumPy, and the same values.
+        """
+        import pandas as pd
+
+        separator = self.separator or " "
+        if separator == " " or b"".join(lines).translate(None, _PLAIN + separator.encode()):
+            return None
+        exact: dict[str, Any] = {} if _version(pd.__version__) >= EXACT_PANDAS else {"float_precision": "round_trip"}
+        text = io.BytesIO(b"\n".join(lines))
+        try:
+            found = pd.read_csv(text, sep=separator, header=None, dtype=np.float64, na_filter=False, **exact).to_numpy()
+        except ValueError:  # of pandas, too: an empty cell, another number of columns, no rows
+            return None
+        return found if found.shape == (len(lines), len(self.headings)) else None
 
     def _line_by_line(self, texts: list[str], first: int) -> Floats:
         """Read line by line, which is slower, to find the line and column of an error."""
@@ -160,6 +186,17 @@ class _Table:
                     ) from None
             rows.append(row)
         return np.array(rows)
+
+
+def _version(text: str) -> tuple[int, ...]:
+    """Major and minor version.
+
+    Examples
+    --------
+    >>> _version("3.1.1") >= (3, 1), _version("2.3.0rc1")
+    (True, (2, 3))
+    """
+    return tuple(int(part) for part in text.split(".")[:2])
 
 
 ENDINGS = ("_N_m", "_kN_m", "_MN_m", "_N", "_kN", "_MN", "_rpm", "_rad_per_s", "_m_per_s", "_s", "_ms", "_min", "_h")

@@ -27,6 +27,7 @@ from exugear.steady.balance.nonlinear import (
     response_of_readings,
     solve_balance,
     solve_turning,
+    turned_balance,
 )
 from exugear.steady.balance.response import (
     Response,
@@ -81,16 +82,24 @@ PERTURBATION = 1.02
 
 
 def harmonic_balance_model(
-    assembly: Assembly, speeds: Floats, harmonics: int | None = None, combinations: int = 3
+    assembly: Assembly,
+    speeds: Floats,
+    harmonics: int | None = None,
+    combinations: int = 3,
+    method: Method = "parametric",
 ) -> HarmonicBalanceModel:
     """Build the model of an assembly for input speeds (rad/s), orders as in `SteadySettings`; linear bearings.
 
-    With contact loss, each state takes as many orders as it needs, starting with few.
+    With contact loss, each state takes as many orders as it needs, starting with few. With the method `linear`,
+    stated loads have no sidebands.
     """
     waves = mesh_waves(mean_system(without_deviations(assembly), speeds))
     usual = FEWEST if LAWS[assembly.mesh_model].loses_contact else waves.needed_harmonics()
     count = usual if harmonics is None else harmonics
-    return HarmonicBalanceModel(waves, count, combinations, shaft_orders(assembly, waves))
+    orders = shaft_orders(assembly, waves)
+    if method == "linear":
+        orders = orders.without_load_sidebands
+    return HarmonicBalanceModel(waves, count, combinations, orders)
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,7 +218,7 @@ class PointSolver:
         model = self.continuation_model
         interface = self.model.at(speed)
         own = model.at(speed) if model is not self.model else interface
-        response = response_of_readings(HarmonicResidual(model, own, model.sampling), readings)
+        response = response_of_readings(turned_balance(model, own, readings), readings)
         if model is self.model:
             return response
         return ContactLossState(model, readings, response, np.nan).on(self.model, interface).response

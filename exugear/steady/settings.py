@@ -196,26 +196,6 @@ def check_deviations(gearbox: Gearbox, method: Method) -> None:
         )
 
 
-def check_continuation(gearbox: Gearbox, continuation: bool) -> None:
-    """Refuse to follow states through turning points under stated excitations.
-
-    Their orders make lines with all orders of the meshes, of which a continuation has twice as many as the method
-    `nonlinear` at single speeds, and their angles would have to settle in each step.
-
-    Raises
-    ------
-    SteadyError
-        There are excitations, and a continuation is asked for.
-    """
-    names = list(dict.fromkeys(load.excitation for load in gearbox.varying_loads))
-    if continuation and names:
-        raise SteadyError(
-            f"continuation: excitations.{names[0]} is not followed through turning points; add "
-            f"{' '.join(f'--without {name}' for name in names[:3])}, or remove --continuation: single speeds "
-            "include it"
-        )
-
-
 def check_ring(assembly: Assembly, method: Method) -> None:
     """Refuse methods that do not include the variation of a flexible ring's stiffness under the planets.
 

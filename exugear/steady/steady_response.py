@@ -18,7 +18,7 @@ from exugear.results.sound.over_speed import line_frequencies
 from exugear.results.sound.radiated_power import RadiatedPower, equivalent_power
 from exugear.steady.balance.excitation import HarmonicBalanceModel
 from exugear.steady.balance.neighbours import judged_speeds, with_needed_neighbours
-from exugear.steady.balance.nonlinear import HarmonicResidual, Tangent, growth_of_state
+from exugear.steady.balance.nonlinear import HarmonicResidual, Tangent, growth_of_state, turned_balance
 from exugear.steady.balance.response import Response, dissipated_and_given, exchanged_power, signals
 from exugear.steady.campbell import Campbell, ModeTracks, campbell_of, modes_over_speed
 from exugear.steady.crossings import (
@@ -43,7 +43,6 @@ from exugear.steady.mean_system.signals import SURFACE_VELOCITY, SignalName
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.settings import (
     SteadySettings,
-    check_continuation,
     check_deviations,
     check_law,
     check_ring,
@@ -108,15 +107,15 @@ def follow_branch(
             "computed with excitation by the carrier angle; remove --continuation"
         )
 
-    def balance_at(speed: float) -> HarmonicResidual:
-        return HarmonicResidual(model, model.at(speed), model.sampling)
+    def balance_at(speed: float, readings: Complexes) -> HarmonicResidual:
+        return turned_balance(model, model.at(speed), readings)
 
     # The unknowns are lengths: a mesh cycle and a radian count as a base pitch.
     lengths = model.lengths
 
     def residual(scaled: Complexes, speed: float) -> tuple[Complexes, Tangent]:
-        balance = balance_at(speed)
         readings = scaled / lengths
+        balance = balance_at(speed, readings)
         excess, tangent, _ = balance.forces(readings)
         return lengths * (readings - balance.static - balance.answer(excess)), tangent
 
@@ -139,7 +138,7 @@ def follow_branch(
     )
     readings = found.lines / lengths
     growth = [
-        growth_of_state(balance_at(float(speed)), reading, model.is_nonlinear)
+        growth_of_state(balance_at(float(speed), reading), reading, model.is_nonlinear)
         for speed, reading in zip(found.parameter, readings, strict=True)
     ]
     ended = ""
@@ -324,10 +323,9 @@ def response_of(
     check_speeds(assembly.gearbox, settings.speeds)
     check_law(assembly.mesh_model, settings.method)
     check_deviations(assembly.gearbox, settings.method)
-    check_continuation(assembly.gearbox, settings.branches)
     check_ring(assembly, settings.method)
     even = settings.speeds.values
-    model = harmonic_balance_model(assembly, even, settings.harmonics, settings.combinations)
+    model = harmonic_balance_model(assembly, even, settings.harmonics, settings.combinations, settings.method)
     solver = PointSolver(model, settings.method)
     report = progress or (lambda done, total: None)
     tracks = _tracks(model, even)

@@ -56,11 +56,12 @@ def export_matrices(
     if body not in flexible:
         raise BadInputError(f"--matrices {body}: no such flexible body; flexible bodies are {', '.join(flexible)}")
     target = to or project.folder / FOLDER
-    keys = keys_of(body, form, body in radiating_names(project.gearbox, Variant.flexible))
-    _refuse_existing(target, keys.values())
+    radiates = body in radiating_names(project.gearbox, Variant.flexible)
+    _refuse_existing(target, keys_of(body, form, radiates, with_gyroscopic=True).values())
     project.begin()
     reduced = project.bodies()[body].reduced
     matrices = interface_of(reduced)
+    keys = keys_of(body, form, radiates, matrices.gyroscopic is not None)
     contents = file_contents(matrices.from_si(units), body, form)
     write_together(target, contents)
     places = (1e3 * matrices.positions).tolist()

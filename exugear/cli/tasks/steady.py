@@ -31,7 +31,6 @@ from exugear.steady.settings import (
     Method,
     SpeedRange,
     SteadySettings,
-    check_continuation,
     check_deviations,
     check_law,
     check_speeds,
@@ -69,7 +68,6 @@ def settings_of_options(
     """Return the settings that the options state; raise an error if they are invalid for the project."""
     check_law(project.choice.mesh_model, method)
     check_deviations(project.gearbox, method)
-    check_continuation(project.gearbox, branches)
     check_speeds(project.gearbox, speeds)
     return SteadySettings(speeds, method, harmonics, branches=branches)
 

@@ -259,7 +259,8 @@ def contributions_of(context: Context, headline: Headline) -> Contributions | No
         return None
     settings = settings_of(response.attrs)
     assembly = context.assembled(headline.choice)
-    model = harmonic_balance_model(assembly, settings.speeds.values, settings.harmonics, settings.combinations)
+    reach = settings.harmonics, settings.combinations
+    model = harmonic_balance_model(assembly, settings.speeds.values, *reach, settings.method)
     line = int(model.lines.find(multiples)[0])
     speed = loudest_near(model.frozen, top.speed, 0.2 * SAME_SPEED, line)
     return contributions(model.frozen, speed, line)

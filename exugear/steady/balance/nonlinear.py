@@ -405,6 +405,12 @@ def nonlinear_response(
     return response_of_readings(balance, readings, products), readings
 
 
+def turned_balance(model: HarmonicBalanceModel, interface: Interface, readings: Complexes) -> HarmonicResidual:
+    """Return the balance of a model with stated loads at the angles that readings (n, m, r) give their bodies."""
+    balance = HarmonicResidual(model, interface, model.sampling)
+    return balance.with_turned_loads(readings) if model.shaft_orders.sidebands else balance
+
+
 def solve_turning(
     balance: HarmonicResidual, readings: Complexes, enough: float = BALANCED
 ) -> tuple[HarmonicResidual, Complexes, int]:

@@ -92,7 +92,8 @@ def motion_at(assembly: Assembly, data: xr.Dataset, speed: float) -> Complexes:
 
 def _model_of(assembly: Assembly, data: xr.Dataset) -> HarmonicBalanceModel:
     settings = settings_of(data.attrs)
-    return harmonic_balance_model(assembly, settings.speeds.values, settings.harmonics, settings.combinations)
+    reach = settings.harmonics, settings.combinations
+    return harmonic_balance_model(assembly, settings.speeds.values, *reach, settings.method)
 
 
 def _amplitudes(model: HarmonicBalanceModel, response: Response, speed: float) -> Complexes:

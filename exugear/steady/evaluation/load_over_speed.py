@@ -85,7 +85,8 @@ class LoadedModels:
         assembly_at : gearbox at a torque over the mean torque
         """
         loads = loads_of(torque)
-        models = [harmonic_balance_model(assembly_at(load), speeds, harmonics, settings.combinations) for load in loads]
+        reach = harmonics, settings.combinations
+        models = [harmonic_balance_model(assembly_at(load), speeds, *reach, settings.method) for load in loads]
         return cls(tuple(models), loads, torque)
 
     def damped(self, end: int) -> LoadedModels:

@@ -2,7 +2,8 @@
 
 Levels between a measurement and a good model differ by -1.6 dB with a standard deviation of 2.1 dB (random gearboxes
 with housing stiffness 0.3 to 0.8, damping 1 to 4 % and inertias off by 5 %); a measurement in g taken for m/s2 differs
-by 20 dB. A peak taken for an rms value (3 dB) is within that scatter and cannot be noticed.
+by 20 dB. A peak taken for an rms value (3 dB) is within that scatter: where all levels of a channel differ by the same
+3 dB it is mentioned as possible, without a correction.
 """
 
 from __future__ import annotations
@@ -37,6 +38,11 @@ GRAVITY_LEVEL = 20.0 * math.log10(STANDARD_GRAVITY)
 """Level of m/s2 over g, dB."""
 LEVEL_ERROR = 10.0
 """Level difference to the model from which a unit is doubted, dB."""
+ROOT_TWO_LEVEL = 20.0 * math.log10(math.sqrt(2.0))
+"""Level of the peak of a harmonic signal over its rms value, dB."""
+ROOT_TWO_RANGE = 0.5
+"""Distance of the median difference from that level, and of half of the differences from their median, up to which
+rms and peak values may have been confused, dB."""
 SLOPE_ERROR = 10.0
 """Slope of the level difference over the frequency from which the quantity is doubted, dB per decade."""
 FEWEST_VALUES = 50
@@ -209,6 +215,23 @@ def level_findings(cuts: ComparedCuts) -> Iterator[Finding]:
                 f"quantity, place and full scale of {key}",
                 offset,
             )
+        elif _differs_by_root_two(cuts, number):
+            taken, meant = ("peak", "rms") if offset > 0.0 else ("rms", "peak")
+            yield Finding(
+                "note",
+                f"channel {channel.name}: computed levels are {offset:+.1f} dB above the measured ones at all orders "
+                f"and speeds, a factor near the square root of 2, as if {meant} values were taken for {taken} values; "
+                f"damping and stiffness may have the same effect: check the calibration of {key}",
+                offset,
+            )
+
+
+def _differs_by_root_two(cuts: ComparedCuts, channel: int) -> bool:
+    """Return whether the levels of a channel differ by one factor near the square root of 2."""
+    difference = cuts.difference[channel][cuts.compared[channel]]
+    offset = cuts.offset(channel)
+    spread = float(np.median(np.abs(difference - offset)))
+    return abs(abs(offset) - ROOT_TWO_LEVEL) < ROOT_TWO_RANGE and spread < ROOT_TWO_RANGE
 
 
 def _slope(cuts: ComparedCuts, channel: int) -> float:

@@ -24,6 +24,7 @@ import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -44,6 +45,7 @@ from exugear.system.kernels.meshes import FRAME
 from exugear.system.kernels.turning import travelling_tangent
 from exugear.system.kernels.varying_loads import VaryingLoadArrays, no_varying_loads, size_and_phase
 from exugear.system.system import Assembly
+from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
 
 NEGLECTED = 1e-2
@@ -51,7 +53,9 @@ NEGLECTED = 1e-2
 SAMPLES_PER_PIECE = 4
 """Samples of each cubic piece of a deviation for its Fourier coefficients; pieces are a fraction of a tooth."""
 REACH = 4
-"""Harmonics of each mesh frequency whose sidebands a stated load has."""
+"""Harmonics of each mesh frequency whose sidebands a stated load has at most."""
+ABSENT = 1e-2
+"""Share of the variation of a mesh stiffness up to which it counts as without a harmonic, which makes the sidebands."""
 LEAST = 1e-9
 """Share of the largest coefficient below which one is zero but for round-off."""
 
@@ -104,6 +108,12 @@ class ShaftOrders:
         both = itertools.product(orders, orders, (1, -1))
         sums = {tuple(a + sign * b for a, b in zip(one, other, strict=True)) for one, other, sign in both}
         return tuple(Sidebands(multiples) for multiples in sorted(sums) if any(multiples))
+
+    @property
+    def without_load_sidebands(self) -> ShaftOrders:
+        """The same without sidebands of stated loads, which are zero where no stiffness varies with the mesh cycle."""
+        own = tuple(one for one in self.sidebands if one.base is None or one.reach is None)
+        return replace(self, sidebands=own)
 
     def reaction_at(self, speed: float, static: Floats) -> Complexes:
         """Generalized forces (t, size) at a speed of the input (rad/s) and static deflections (size,)."""
@@ -259,7 +269,22 @@ class _Series:
         for key, turned in self._in_frame(load.body, load.order, wave):
             self._add(self.displacement, (number, key), np.zeros(len(self.waves.waves), dtype=complex))
             self._add(self.reaction, (number, key), turned)
-            self.beside += [(key, None, None), *((key, base, REACH) for base in range(len(self.waves.base_orders)))]
+            self.beside.append((key, None, None))
+            self.beside += [(key, base, reach) for base, reach in enumerate(self._reaches) if reach]
+
+    @cached_property
+    def _reaches(self) -> list[int]:
+        """Harmonics of each mesh frequency that have sidebands of stated loads: up to the highest of its stiffness."""
+        waves = self.waves
+        if LAWS[self.assembly.mesh_model].loses_contact:
+            return [REACH] * len(waves.base_orders)
+        found = [0] * len(waves.base_orders)
+        sizes = np.abs(waves.cycle_coefficients("tangent", harmonics=2 * REACH))[:, 1:]
+        for n, wave in enumerate(waves.waves):
+            present = sizes[n, :REACH] > max(ABSENT * float(np.linalg.norm(sizes[n])), LEAST * waves.mean_stiffness[n])
+            own = REACH if waves.moving[n] else int(np.flatnonzero(present).max(initial=-1)) + 1
+            found[wave.base] = max(found[wave.base], own)
+        return found
 
     def _in_frame(self, body: str, order: float, wave: Complexes) -> list[tuple[Key, Complexes]]:
         """Multiples of rotations, and generalized forces (size,) in the rotating frame, of a load on a body."""

@@ -300,6 +300,8 @@ def marked_nodes(positions: Floats, size: int) -> BodySurface:
 def interface_of(body: ReducedBody) -> InterfaceMatrices:
     """Return mass, stiffness and surface of a reduced body on its seats, for other programs; in SI units.
 
+    A shaft has its gyroscopic matrix as well, in a frame that does not rotate.
+
     Nodes are numbered from 1 in the order of the seats. Modes above the limit of the body are at this limit.
 
     Examples
@@ -317,6 +319,7 @@ def interface_of(body: ReducedBody) -> InterfaceMatrices:
         modal=tuple(range(FIRST_MODAL, FIRST_MODAL + len(body.modal_groups))),
         mass=body.mass,
         stiffness=body.stiffness,
+        gyroscopic=body.gyroscopic if body.frame == "nonrotating" and body.gyroscopic.any() else None,
         normal_motion=None if body.radiating is None else body.radiating.matrix,
         area=0.0 if body.radiating is None else body.radiating.area,
     )

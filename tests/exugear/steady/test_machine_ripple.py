@@ -19,6 +19,7 @@ from exugear.gearbox.reading import GearboxFileError
 from exugear.steady.balance.response import signals
 from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.steady.steady_file import load_response
 from exugear.steady.steady_response import response_of
 from exugear.system.build import assemble
 from exugear.system.gearbox_checks import gearbox_warnings
@@ -348,15 +349,20 @@ def test_the_page_lists_excitations_and_deviations_among_its_assumptions_with_th
     assert "excitations.ripple: amplitude of 500 N m on shaft 1" in page
 
 
-def test_a_continuation_under_an_excitation_is_refused_before_any_work(tmp_path, monkeypatch):
+def test_a_continuation_follows_states_under_an_excitation(tmp_path, monkeypatch):
+    """The same peaks as at single speeds within the single precision of the file, at the first speed of both."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "gearbox.toml").write_text(toml_text(content(orders=[12], torque_percent=[1.0])), encoding="utf-8")
-    arguments = ["steady", "gearbox.toml", "--speeds", "300:3000", "--method", "nonlinear", "--continuation"]
-    result = CliRunner().invoke(app, arguments)
-    assert result.exit_code == 2
-    said = " ".join(result.output.split())
-    assert "continuation: excitations.ripple is not followed through turning points; add --without ripple" in said
-    assert not (tmp_path / "results").exists()
+    case = content(orders=[12], torque_percent=[1.0])
+    case["pairs"]["spur"]["stiffness"] = {"mean_N_per_m": 3e8, "cosine_N_per_m": [2e6]}
+    (tmp_path / "gearbox.toml").write_text(toml_text(case), encoding="utf-8")
+    arguments = ["steady", "gearbox.toml", "--speeds", "1000:1030", "--method", "nonlinear"]
+    amplitudes = []
+    for out, more in (("branch", ["--continuation"]), ("single", ["--points", "2"])):
+        assert CliRunner().invoke(app, [*arguments, *more, "--out", out]).exit_code == 0
+        (path,) = (tmp_path / out).rglob("steady-*.nc")
+        data = load_response(path)
+        amplitudes.append(np.abs(data["amplitude"].to_numpy()[0, 1:, 0]))
+    np.testing.assert_allclose(*amplitudes, rtol=1e-5, atol=1e-6 * amplitudes[1].max())
 
 
 def test_the_summary_lists_speeds_at_which_loads_do_not_settle(tmp_path, monkeypatch):

@@ -209,23 +209,32 @@ def file_contents(matrices: InterfaceMatrices, stem: str, form: MatrixFormat) ->
     stem : beginning of the file names
     form : npz, csv, mtx (Abaqus matrix input) and op4 (ASCII) keep all digits; dmig (Nastran punch) ten to fourteen
     """
-    surface = {} if matrices.normal_motion is None else {f"{stem}-surface.npz": recovery_content(matrices)}
+    more = {} if matrices.normal_motion is None else {f"{stem}-surface.npz": recovery_content(matrices)}
+    if matrices.gyroscopic is not None:
+        more[gyroscopic_name(stem)] = csv_matrix_content(matrices, "gyroscopic")
     if form == "npz":
-        return {f"{stem}.npz": npz_content(matrices)} | surface
+        return {f"{stem}.npz": npz_content(matrices)} | more
     if form == "dmig":
-        return {f"{stem}.pch": punch_content(matrices, WRITTEN_NAMES)} | surface
+        return {f"{stem}.pch": punch_content(matrices, WRITTEN_NAMES)} | more
     if form == "op4":
-        return surface | {
+        return more | {
             f"{stem}.op4": op4_content(matrices, WRITTEN_NAMES),
             f"{stem}-nodes.pch": punch_nodes_content(matrices),
         }
     content = csv_matrix_content if form == "csv" else mtx_content
     files = {f"{stem}-{kind}.{form}": content(matrices, kind) for kind in KINDS}
-    return {**files, f"{stem}-nodes.csv": csv_nodes_content(matrices)} | surface
+    return {**files, f"{stem}-nodes.csv": csv_nodes_content(matrices)} | more
 
 
-def keys_of(stem: str, form: MatrixFormat, with_surface: bool = False) -> dict[str, str]:
+def gyroscopic_name(stem: str) -> str:
+    """Name of the file of a gyroscopic matrix, a CSV table beside the files of any format."""
+    return f"{stem}-gyroscopic.csv"
+
+
+def keys_of(stem: str, form: MatrixFormat, with_surface: bool = False, with_gyroscopic: bool = False) -> dict[str, str]:
     """Keys of `[bodies.NAME.external]` that name the files of `file_contents`."""
+    if with_gyroscopic:
+        return {**keys_of(stem, form, with_surface), "gyroscopic": gyroscopic_name(stem)}
     if with_surface:
         return {**keys_of(stem, form), "recovery": f"{stem}-surface.npz"}
     if form in ("npz", "dmig"):

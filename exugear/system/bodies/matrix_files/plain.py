@@ -272,7 +272,7 @@ def read_csv_nodes(path: Path) -> NodeTable:
 
 
 def csv_matrix_content(matrices: InterfaceMatrices, name: str) -> bytes:
-    """Content of the CSV file of a matrix, "mass" or "stiffness", exact to the last digit."""
+    """Content of the CSV file of a matrix, "mass", "stiffness" or "gyroscopic", exact to the last digit."""
     buffer = io.BytesIO()
     headings = ",".join(f"{node}.{component}" for node, component in matrices.labels)
     np.savetxt(buffer, getattr(matrices, name), fmt="%.17g", delimiter=",", header=headings, comments="")

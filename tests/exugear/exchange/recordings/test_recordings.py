@@ -245,6 +245,19 @@ def test_units_of_a_table_are_in_its_headings_or_below_them(tmp_path, signals, h
     assert recording.channels[1].values == pytest.approx(signals[1], rel=1e-8, abs=1e-9)
 
 
+@pytest.mark.parametrize("form", ["{!r}", "{:.25g}", "{:+.7E}", "{:.40f}"])
+@pytest.mark.parametrize("text_beside", [False, True])
+def test_numbers_of_a_table_are_the_nearest_floating_point_numbers(tmp_path, form, text_beside):
+    """As Python's own `float` rounds them, in lines of numbers alone and in those with text in a column beside."""
+    rng = np.random.default_rng(2)
+    values = rng.normal(size=2000) * 10.0 ** rng.integers(-30, 30, 2000)
+    written_as = [form.format(float(value)) for value in values]
+    rows = [f"{n},{text},{'ok' if text_beside else 0}" for n, text in enumerate(written_as)]
+    (path := tmp_path / "a.csv").write_text("\n".join(["time_s,left_m_per_s2,state", *rows]) + "\n")
+    (channel,) = read_recording(path, ["left"]).channels
+    assert channel.values.tolist() == [float(text) for text in written_as]
+
+
 ROWS = [[f"{n / 100:.2f}", f"{n % 9}"] for n in range(40)]
 
 
