@@ -242,7 +242,7 @@ def export(
     whole: options.AllOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Write results into a copy of a REXS file, or matrices, loads or velocities.
+    """Write results for other programs: REXS, matrices, loads.
 
     In a REXS file, geometry and static forces are always written; tables, modes, bearings and runs if the results
     folder has them. Use --shifts and --distances of the import.
