@@ -282,7 +282,7 @@ class _Series:
         sizes = np.abs(waves.cycle_coefficients("tangent", harmonics=2 * REACH))[:, 1:]
         for n, wave in enumerate(waves.waves):
             present = sizes[n, :REACH] > max(ABSENT * float(np.linalg.norm(sizes[n])), LEAST * waves.mean_stiffness[n])
-            own = REACH if waves.moving[n] else int(np.flatnonzero(present).max(initial=-1)) + 1
+            own = REACH if waves.moving[wave.first] else int(np.flatnonzero(present).max(initial=-1)) + 1
             found[wave.base] = max(found[wave.base], own)
         return found
 
