@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -168,6 +169,8 @@ def export_surface(
     """Write the velocities on the surface of flexible housings at a speed, as netCDF and as VTK file."""
     if speed is None:
         raise BadInputError("--surface: name a computed speed with --speed RPM")
+    if find_spec("meshio") is None:
+        raise BadInputError("--surface: meshio is not installed: pip install 'exugear[mesh]'")
     folder = to or response.parent
     names = [f"{response.stem}-surface.{ending}" for ending in ("nc", "vtu")]
     _refuse_existing(folder, names)
@@ -242,7 +245,8 @@ def _refuse_existing(folder: Path, names: Iterable[str]) -> None:
 def _nearest(speeds: np.ndarray, speed: float) -> int:
     """Index of the computed speed next to one in rpm."""
     nearest = int(np.abs(speeds - RPM * speed).argmin())
-    if abs(speeds[nearest] - RPM * speed) > SPEED_TOLERANCE * abs(RPM * speed):
+    # Written so that a speed that is not a number is refused.
+    if not abs(speeds[nearest] - RPM * speed) <= SPEED_TOLERANCE * abs(RPM * speed):
         raise BadInputError(
             f"--speed {speed:g}: not computed; the response has {len(speeds)} speeds, the nearest is "
             f"{speeds[nearest] / RPM:.6g} rpm"

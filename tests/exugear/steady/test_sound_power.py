@@ -214,6 +214,7 @@ def test_velocities_of_the_surface_for_other_programs_radiate_the_same_power(tmp
     [
         ((), "name a computed speed with --speed RPM"),
         (("--speed", 9000), "not computed; the response has"),
+        (("--speed", "nan"), "not computed; the response has"),
     ],
 )
 def test_velocities_of_the_surface_need_a_computed_speed(tmp_path, more, said):
