@@ -146,7 +146,7 @@ class FlankTopography(ReprMixin):
 
     def _line(self) -> str:
         radii = value_range(self.radius, "mm", 1e3)
-        removed = value_range(self.removed, "um", 1e6)
+        removed = value_range(self.removed, "µm", 1e6)
         return f": {len(self.radius)} x {len(self.axial)} points, radius {radii}, {removed} removed"
 
 
@@ -309,7 +309,7 @@ class FlankModification(ReprMixin):
         amounts = {"tip_relief": self.tip_relief, "root_relief": self.root_relief}
         removed = {name: relief.amount for name, relief in amounts.items() if relief}
         removed |= {name: getattr(self, name) for name in names if getattr(self, name)}
-        shown = {name.replace("_", " "): value_range(amount, "um", 1e6) for name, amount in removed.items()}
+        shown = {name.replace("_", " "): value_range(amount, "µm", 1e6) for name, amount in removed.items()}
         return shown | ({"topography": "by a grid"} if self.topography else {})
 
 

@@ -46,7 +46,10 @@ def _value(symbol: str, flank: FlankSheet) -> float:
     return sheet_value(symbol, flank.standard.get(symbol, math.nan))
 
 
-FLANK_LEGEND = "S_H, S_F: safety against pitting and tooth breakage, with load factors."
+FLANK_LEGEND = (
+    "S_H, S_F: safety against pitting and tooth breakage over the life, to ISO 6336. Stresses and K_Hbeta: of the load "
+    "with the largest damage. Safety by finite elements: life."
+)
 FLANKS = (
     Column("gear", lambda flank: f"{flank.gear} {flank.flank}"),
     Column("mesh", lambda flank: flank.family + " reversed" * (flank.sense < 0), is_text=True),
@@ -54,10 +57,10 @@ FLANKS = (
         Column(heading, partial(_value, symbol), form)
         for heading, symbol, form in (
             ("σ_H\nMPa", "sigma_H", ".0f"),
-            ("S_H", "S_H", ".2f"),
+            ("S_H\nISO", "S_H", ".2f"),
             ("σ_F\nMPa", "sigma_F", ".0f"),
-            ("S_F", "S_F", ".2f"),
-            ("K_Hβ", "K_Hbeta", ".2f"),
+            ("S_F\nISO", "S_F", ".2f"),
+            ("K_Hbeta", "K_Hbeta", ".2f"),
         )
     ),
 )

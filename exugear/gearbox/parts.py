@@ -255,14 +255,14 @@ class WheelDeviation(ReprMixin):
     """Polar angle of the eccentricity at zero body angle, rad."""
 
     def _line(self) -> str:
-        runout = value_range(2.0 * self.eccentricity, "um", 1e6)
-        return f": {self.teeth} teeth, runout {runout}, pitch {value_range(self.pitch, 'um', 1e6)}"
+        runout = value_range(2.0 * self.eccentricity, "µm", 1e6)
+        return f": {self.teeth} teeth, runout {runout}, pitch {value_range(self.pitch, 'µm', 1e6)}"
 
     def _table(self) -> TitledRows:
         return "deviations of a gear", {
             "teeth": str(self.teeth),
-            "cumulative pitch on the line of action": value_range(self.pitch, "um", 1e6),
-            "runout": value_range(2.0 * self.eccentricity, "um", 1e6),
+            "cumulative pitch on the line of action": value_range(self.pitch, "µm", 1e6),
+            "runout": value_range(2.0 * self.eccentricity, "µm", 1e6),
             "angle of the eccentricity": value_range(math.degrees(self.eccentricity_angle), "deg"),
         }
 

@@ -45,7 +45,7 @@ class ContactSolution(ReprMixin):
     def _line(self) -> str:
         loaded = np.count_nonzero(self.force)
         approach = 1e6 * self.approach
-        return f": {loaded} of {len(self.force)} cells in contact, approach {approach:.4g} um"
+        return f": {loaded} of {len(self.force)} cells in contact, approach {approach:.4g} µm"
 
 
 def solve_complementarity(

@@ -177,5 +177,5 @@ class GearPair(UncheckedPair, ReprMixin):
             "working pressure angle": value_range(math.degrees(self.working_pressure_angle), "deg"),
             "transverse contact ratio": f"{self.transverse_contact_ratio:.3f}",
             "overlap ratio": f"{self.overlap_ratio:.3f}",
-            "circumferential backlash": value_range(self.circumferential_backlash, "um", 1e6),
+            "circumferential backlash": value_range(self.circumferential_backlash, "µm", 1e6),
         }

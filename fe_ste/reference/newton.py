@@ -131,7 +131,7 @@ class Equilibrium(ReprMixin):
 
 def convergence_table(iterations: Sequence[Iteration]) -> str:
     """Lay out the iterations of an analysis as text, one a line."""
-    head = "load %  iteration  in contact  changed  step  force error  gap error     hub um"
+    head = "load %  iteration  in contact  changed  step  force error  gap error     hub µm"
     rows = [
         f"{100 * row.load:6.4g}  {row.number:9d}  {row.active:10d}  {row.changed:7d}  {row.step_length:4.2f}"
         f"  {row.force_error:11.1e}  {row.gap_error:9.1e}  {1e6 * row.hub:9.4f}"

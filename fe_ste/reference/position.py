@@ -119,13 +119,13 @@ class NonlinearPosition(ReprMixin):
         return int(self.model.held.size)
 
     def _line(self) -> str:
-        return f" of {self.pair.name!r}: pmc {self.pmc:.4g}, torque {self.torque:g} N m, ste {1e6 * self.ste:.5g} um"
+        return f" of {self.pair.name!r}: pmc {self.pmc:.4g}, torque {self.torque:g} N m, ste {1e6 * self.ste:.5g} µm"
 
     def _table(self) -> TitledRows:
         return f"gear pair {self.pair.name} by the reference analysis", {
             "position in the mesh cycle": f"{self.pmc:.4g}",
             "torque": value_range(self.torque, "N m"),
-            "static transmission error": value_range(self.ste, "um", 1e6),
+            "static transmission error": value_range(self.ste, "µm", 1e6),
             "load share": ", ".join(f"tooth pair {tooth}: {share:.1%}" for tooth, share in self.load_share.items()),
             "unknowns": str(self.unknowns),
             "Newton iterations": str(len(self.equilibrium.iterations)),

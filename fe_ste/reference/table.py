@@ -243,8 +243,8 @@ class NonlinearTable(ReprMixin):
         return f"gear pair {self.dataset.attrs['pair']} by the reference analysis", {
             "positions solved": f"{int(self.dataset['converged'].sum())} of {self.dataset.sizes['pmc']}",
             "torque": value_range(self.dataset["torque"], "N m"),
-            "static transmission error": value_range(self.dataset["ste"], "um", 1e6),
-            "mesh stiffness": value_range(self.dataset["mesh_stiffness"], "N/um", 1e-6),
+            "static transmission error": value_range(self.dataset["ste"], "µm", 1e6),
+            "mesh stiffness": value_range(self.dataset["mesh_stiffness"], "N/µm", 1e-6),
             "positions that failed": str(len(self.failures)),
             "input": self.input_hash[:12],
         }

@@ -55,7 +55,7 @@ class MethodBStiffness(ReprMixin):
         return self.mesh_stiffness * self.face_width
 
     def _line(self) -> str:
-        return f": mesh {1e-9 * self.mesh_stiffness:.4g} N/(mm um), {1e-6 * self.stiffness:.4g} N/um"
+        return f": mesh {1e-9 * self.mesh_stiffness:.4g} N/(mm µm), {1e-6 * self.stiffness:.4g} N/µm"
 
     def _table(self) -> TitledRows:
         per_width = {
@@ -64,8 +64,8 @@ class MethodBStiffness(ReprMixin):
             "mesh stiffness": self.mesh_stiffness,
         }
         return "stiffness to ISO 6336-1 method B", {
-            **{name: value_range(value, "N/(mm um)", 1e-9) for name, value in per_width.items()},
-            "mean mesh stiffness": value_range(self.stiffness, "N/um", 1e-6),
+            **{name: value_range(value, "N/(mm µm)", 1e-9) for name, value in per_width.items()},
+            "mean mesh stiffness": value_range(self.stiffness, "N/µm", 1e-6),
             "outside validity": "; ".join(self.outside_validity) or "no",
         }
 

@@ -116,7 +116,7 @@ class PairCompliance(ReprMixin):
             "modifications": f"{pinion} {gear}",
             "contact": repr(self.contact),
             "tooth pairs that may touch": f"{self.teeth[0]} to {self.teeth[-1]}",
-            "gaps of tooth pairs": "none" if self.tooth_gap is None else value_range(self.tooth_gap, "um", 1e6),
+            "gaps of tooth pairs": "none" if self.tooth_gap is None else value_range(self.tooth_gap, "µm", 1e6),
         }
 
 

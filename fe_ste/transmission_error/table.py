@@ -285,8 +285,8 @@ class MeshTable(ReprMixin):
     def _table(self) -> TitledRows:
         return f"static transmission error of gear pair {self.dataset.attrs['pair']}", {
             **self._ranges(),
-            "static transmission error": value_range(self.dataset["ste"], "um", 1e6),
-            "mesh stiffness": value_range(self.dataset["mesh_stiffness"], "N/um", 1e-6),
+            "static transmission error": value_range(self.dataset["ste"], "µm", 1e6),
+            "mesh stiffness": value_range(self.dataset["mesh_stiffness"], "N/µm", 1e-6),
             "non-converged states": str(len(self.failures)),
             "input": self.input_hash[:12],
         }

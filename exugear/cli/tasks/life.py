@@ -20,13 +20,13 @@ _column = partial(Column, missing="")
 CONTACT_LEGEND = (
     "σ_H life: largest over loads and mesh cycle within the path of contact, misaligned by each load, with K_v "
     "(finite elements); σ_H0: nominal, at the pitch point, at the largest load (ISO 6336-2). Outside: load carried "
-    "outside the path of contact. K_Hbeta: of finite elements, at the largest load; S_H ISO has it, too: σ_H0 with "
-    "load factors (ISO 6336-2). S_H stat.: under the largest load."
+    "outside the path of contact. K_Hbeta: of finite elements, at the largest load. S_H FE: over the life, by finite "
+    "elements; ISO, FE: by ISO 6336-2 with K_Hbeta of finite elements; stat.: under the largest load."
 )
 ROOT_LEGEND = (
     "σ_F: maximum root stress (finite elements); nominal: σ_F0 of ISO 6336-3 at the largest load, without load "
-    "factors; minimum: smallest principal stress (compression). S_F ISO: safety factor of ISO 6336-3; stat.: under the "
-    "largest load."
+    "factors; minimum: smallest principal stress (compression). S_F FE: over the life, by finite elements; ISO, FE: by "
+    "ISO 6336-3 with K_Hbeta of finite elements; stat.: under the largest load."
 )
 BEARING_LEGEND = (
     "Largest: radial load, with partial factors of extreme loads; equiv.: constant equivalent load of the same damage "
@@ -75,8 +75,8 @@ FLANKS = (
     _column("outside\n%", "outside", ".1f", 100.0),
     _column("K_Hbeta", "face_load", ".3f"),
     _column("fatigue\ndamage", "contact_damage", _damage),
-    _column("S_H", "contact_safety", ".2f"),
-    _column("S_H\nISO", "standard_contact_safety", ".2f"),
+    _column("S_H\nFE", "contact_safety", ".2f"),
+    _column("S_H\nISO, FE", "standard_contact_safety", ".2f"),
     _column("S_H\nstat.", "contact_static", ".2f"),
 )
 ROOTS = (
@@ -85,8 +85,8 @@ ROOTS = (
     _column("nominal\nstress MPa", "nominal_root", ".0f", 1e-6),
     _column("minimum\nstress MPa", "compression", ".0f", 1e-6),
     _column("fatigue\ndamage", "root_damage", _damage),
-    _column("S_F", "root_safety", ".2f"),
-    _column("S_F\nISO", "standard_root_safety", ".2f"),
+    _column("S_F\nFE", "root_safety", ".2f"),
+    _column("S_F\nISO, FE", "standard_root_safety", ".2f"),
     _column("S_F\nstat.", "root_static", ".2f"),
 )
 BEARINGS = (
@@ -123,14 +123,14 @@ PARTS = (
     Column("part", "part"),
     Column("failure\nmode", "mode", is_text=True),
     _column("damage", "damage", _damage),
-    _column("S_H", "contact_safety", ".2f"),
-    _column("S_F", "root_safety", ".2f"),
+    _column("S_H\nFE", "contact_safety", ".2f"),
+    _column("S_F\nFE", "root_safety", ".2f"),
     _column("S_0", "static_safety", ".2f"),
     _column("life\nh", _shortest_life, life_text),
 )
 PART_LEGEND = (
-    "Damage: 1 is failure at the design probability. S_H, S_F: by finite elements, with load factors; stresses are "
-    "those of each mesh, misaligned by each load. Life: the shortest of L10, L10r and L10m."
+    "Damage: 1 is failure at the design probability. S_H, S_F: over the life, by finite elements, misaligned by "
+    "each load, with K_v; to ISO 6336: check --rating. Life: the shortest of L10, L10r and L10m."
 )
 
 

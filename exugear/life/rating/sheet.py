@@ -297,7 +297,7 @@ def _load_in_words(gearbox: Gearbox, counted: CountedLoads) -> str:
     hours = float(counted.distribution.hours.sum())
     if gearbox.case.loads is not None:
         count = len(counted.points.torque)
-        return f"spectrum on {counted.body}: {count} loads, {hours:,.0f} h; factors of the decisive load"
+        return f"spectrum on {counted.body}: {count} loads, {hours:,.0f} h"
     source = counted.sources[0]
     torque = f"{1e-3 * source.largest:.6g} kN m on {counted.body}"
     return f"nominal load: {torque} at {source.fastest / RPM:.4g} rpm, {hours:,.0f} h"

@@ -29,7 +29,7 @@ from exugear.system.operating_points import bearing_duties, mesh_duties
 from exugear.system.statics import BalanceError
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.contact_state import MeshLoadState
-from fe_ste.tools.display import LONGEST_LIFE, life_text, without_round_off
+from fe_ste.tools.display import life_text, without_round_off
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -317,13 +317,13 @@ def _flank_rows(data: xr.Dataset) -> list[dict[str, Any]]:
         "outside the path / %": ("outside", 100.0, ".1f"),
         "K_Hbeta": ("face_load", 1.0, ".3f"),
         "pitting damage": ("contact_damage", 1.0, ".3g"),
-        "S_H": ("contact_safety", 1.0, ".2f"),
-        "S_H, ISO": ("standard_contact_safety", 1.0, ".2f"),
+        "S_H, FE": ("contact_safety", 1.0, ".2f"),
+        "S_H, ISO, FE": ("standard_contact_safety", 1.0, ".2f"),
         "σ_F / MPa": ("root_stress", 1e-6, ".0f"),
         "σ_F0, ISO / MPa": ("nominal_root", 1e-6, ".0f"),
         "root damage": ("root_damage", 1.0, ".3g"),
-        "S_F": ("root_safety", 1.0, ".2f"),
-        "S_F, ISO": ("standard_root_safety", 1.0, ".2f"),
+        "S_F, FE": ("root_safety", 1.0, ".2f"),
+        "S_F, ISO, FE": ("standard_root_safety", 1.0, ".2f"),
         "static S_H": ("contact_static", 1.0, ".2f"),
         "static S_F": ("root_static", 1.0, ".2f"),
     }
@@ -331,7 +331,7 @@ def _flank_rows(data: xr.Dataset) -> list[dict[str, Any]]:
     for row, outside in zip(rows, data["flank_outside"].to_numpy().tolist(), strict=True):
         if outside > LEAST_OUTSIDE:
             text = f"{100.0 * outside:.1f} % of the load is outside the path of contact, where no stress is rated"
-            for title in ("σ_H life / MPa", "S_H"):
+            for title in ("σ_H life / MPa", "S_H, FE"):
                 row[title] = replace(row[title], caveat=text)
     return rows
 
@@ -373,5 +373,5 @@ def _cell(data: xr.Dataset, name: str, place: int, key: str, factor: float, form
     if key.endswith("damage") and value < LEAST_DAMAGE:
         return Cell(f"below {LEAST_DAMAGE:g}", value)
     if key.endswith("hours"):
-        return Cell(figure_text(float(format(value, form))) if value <= LONGEST_LIFE else life_text(value), value)
+        return Cell(life_text(value), value)
     return Cell(format(without_round_off(value), form), value)

@@ -288,7 +288,7 @@ class MeshLoadState(ReprMixin):
     """Why no contact was solved; empty where it was."""
 
     def _line(self) -> str:
-        return f" of {self.name!r}: gap {1e6 * self.opening:.3g} um, K_Hbeta {self.face_load_factor:.3g}"
+        return f" of {self.name!r}: gap {1e6 * self.opening:.3g} µm, K_Hbeta {self.face_load_factor:.3g}"
 
 
 def with_contact(duty: MeshLoadState, place: MeshPlace | None, flank: int) -> MeshLoadState:

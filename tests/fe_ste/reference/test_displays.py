@@ -147,7 +147,7 @@ def test_units_stand_beside_the_numbers(shown):
 
 def test_an_unmodified_flank_says_so():
     assert repr(fe_ste.FlankModification()) == "<FlankModification: none>"
-    assert repr(fe_ste.FlankModification(twist=-2e-6)) == "<FlankModification: twist -2 um>"
+    assert repr(fe_ste.FlankModification(twist=-2e-6)) == "<FlankModification: twist -2 µm>"
 
 
 def test_states_that_failed_are_no_hindrance(shown):

@@ -294,7 +294,7 @@ class BearingState(ReprMixin):
             for values in (1e6 * self.displacement[:3], 1e-3 * self.load[:3])
         )
         carrying = f"{np.count_nonzero(self.element_load)} of {len(self.element_load)} elements loaded"
-        return f" ({displacement}) um under ({load}) kN, {carrying}"
+        return f" ({displacement}) µm under ({load}) kN, {carrying}"
 
     @property
     def radial_stiffness(self) -> float:

@@ -292,7 +292,7 @@ def test_the_laminae_leave_half_a_percent_in_the_stiffness(name, profile, tilt):
 def test_a_state_shows_itself_in_one_line():
     state = equilibrium(NJ2232, (129.9e3, 0.0, 0.0))
     carrying = np.count_nonzero(state.element_load)
-    assert repr(state) == f"<BearingState (33.3, 0, 0) um under (130, 0, 0) kN, {carrying} of 17 elements loaded>"
+    assert repr(state) == f"<BearingState (33.3, 0, 0) µm under (130, 0, 0) kN, {carrying} of 17 elements loaded>"
 
 
 @pytest.mark.parametrize(
