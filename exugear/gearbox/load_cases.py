@@ -23,7 +23,7 @@ from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from fe_ste.standards.mesh_loss import loss_factor
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.display import ReprMixin, TitledRows, value_range
+from fe_ste.tools.display import ReprMixin, TitledRows, torque_text, value_range
 
 # Torques of a load case over time, from a CSV file in the folder of the gearbox file
 
@@ -411,9 +411,9 @@ def load_in_words(case: LoadCase) -> str:
     --------
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
     >>> load_in_words(gearbox.load_cases["speed_driven"])
-    'carrier 240000 N m, hss driven'
+    'carrier 240 kN m, hss driven'
     """
-    parts = [f"{body} {torque:.6g} N m" for body, torque in case.torques.items()]
+    parts = [f"{body} {torque_text(torque)}" for body, torque in case.torques.items()]
     if case.torque_series is not None:
         parts.append(f"torques of {case.torque_series.name}")
     if case.driven_body is not None:
@@ -427,10 +427,10 @@ def static_load_in_words(gearbox: Gearbox) -> str:
     Examples
     --------
     >>> static_load_in_words(Gearbox.from_toml("cases/grc750/gearbox.toml"))
-    'carrier 240000 N m'
+    'carrier 240 kN m'
     """
     torques = gearbox.case.static_load.torques_N_m
-    return ", ".join(f"{body} {torque:.6g} N m" for body, torque in torques.items()) or "no torque"
+    return ", ".join(f"{body} {torque_text(torque)}" for body, torque in torques.items()) or "no torque"
 
 
 def gearbox_at_load(gearbox: Gearbox, case: LoadCase) -> Gearbox:

@@ -12,7 +12,7 @@ import numpy as np
 
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.display import ReprMixin, TitledRows
+from fe_ste.tools.display import ReprMixin, TitledRows, torque_text
 
 # Kinematics of a gear train: rows for mesh closure and coupling twist, and the motions for which both are zero
 
@@ -219,7 +219,7 @@ class Train(
             "ratio": f"{self.ratio:.6g}",
             "degrees of freedom": str(self.degrees_of_freedom),
             "spins": ", ".join(self.spins),
-            "static load": ", ".join(f"{torque:g} N m on {body}" for body, torque in self.torques.items()),
+            "static load": ", ".join(f"{torque_text(torque)} on {body}" for body, torque in self.torques.items()),
             "held by": ", ".join(self.locked) or "nothing",
         }
 

@@ -145,6 +145,23 @@ def life_text(value: float) -> str:
     return f"{float(text):.0f}" if "e+" in text else text
 
 
+def torque_unit(largest: float) -> tuple[str, float]:
+    """Return the unit in which torques up to a value (N m) are printed, and the factor from N m to it."""
+    return ("kN m", 1e-3) if abs(largest) >= 1e4 else ("N m", 1.0)
+
+
+def torque_text(torque: float) -> str:
+    """Return a torque (N m) with its unit.
+
+    Examples
+    --------
+    >>> torque_text(-72.5), torque_text(240e3)
+    ('-72.5 N m', '240 kN m')
+    """
+    unit, factor = torque_unit(torque)
+    return f"{factor * torque:.6g} {unit}"
+
+
 def value_range(values: ArrayLike, unit: str, scale: float = 1.0) -> str:
     """Return the range of some values, minimum to maximum, as text, or the single value.
 

@@ -15,6 +15,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.life.load_spectrum.counted import count_loads, draw_duration, write_spectra
 from exugear.project import results_folder
 from exugear.results.findings import Finding
+from fe_ste.tools.display import torque_unit
 
 HUB_LEGEND = "Range in kN (forces) and kN m (moments), one cycle per second, by S-N exponent."
 
@@ -43,29 +44,44 @@ def _verdict(summary: Mapping[str, Any]) -> str:
     """Return the damage-equivalent torque with the largest S-N exponent m."""
     exponent, torque = max(summary["equivalent_torque_kN_m"].items(), key=lambda own: float(own[0]))
     largest = max(source["largest_torque_kN_m"] for source in summary["sources"])
+    unit, factor = _torque_unit(summary)
     return (
-        f"Torque on {summary['body']}: equivalent {_three(torque)} kN m (m = {exponent}), largest "
-        f"{_three(largest)} kN m, {summary['hours']:,.0f} h"
+        f"Torque on {summary['body']}: equivalent {_three(factor * torque)} {unit} (m = {exponent}), "
+        f"largest {_three(factor * largest)} {unit}, {summary['hours']:,.0f} h"
     )
 
 
 _three = partial(significant, digits=3)
-SOURCES = (
-    Column("source", "source"),
-    Column("kind", "kind", is_text=True),
-    Column("hours", "hours", ".0f"),
-    Column("mean\ntorque\nkN m", "mean_torque_kN_m", _three),
-    Column("minimum\ntorque\nkN m", "least_torque_kN_m", _three),
-    Column("maximum\ntorque\nkN m", "largest_torque_kN_m", _three),
-    Column("mean\nspeed\nrpm", "mean_speed_rpm", _three),
-    detail("skipped at\nstart, s", "skipped_s", ".4g"),
-    detail("files", "files"),
-)
-EQUIVALENTS = (
-    Column("S-N exponent", "exponent"),
-    Column("torque\nkN m", "torque", _three, missing=""),
-    Column("torque range\nkN m", "range", _three, missing=""),
-)
+
+
+def _torque_unit(summary: Mapping[str, Any]) -> tuple[str, float]:
+    """Return the unit of all torques of a summary, and the factor from kN m to it."""
+    unit, factor = torque_unit(1e3 * max(abs(source["largest_torque_kN_m"]) for source in summary["sources"]))
+    return unit, 1e3 * factor
+
+
+def _source_columns(unit: str, factor: float) -> tuple[Column, ...]:
+    return (
+        Column("source", "source"),
+        Column("kind", "kind", is_text=True),
+        Column("hours", "hours", ".0f"),
+        Column(f"mean\ntorque\n{unit}", "mean_torque_kN_m", _three, factor),
+        Column(f"minimum\ntorque\n{unit}", "least_torque_kN_m", _three, factor),
+        Column(f"maximum\ntorque\n{unit}", "largest_torque_kN_m", _three, factor),
+        Column("mean\nspeed\nrpm", "mean_speed_rpm", _three),
+        detail("skipped at\nstart, s", "skipped_s", ".4g"),
+        detail("files", "files"),
+    )
+
+
+def _equivalent_columns(unit: str, factor: float) -> tuple[Column, ...]:
+    return (
+        Column("S-N exponent", "exponent"),
+        Column(f"torque\n{unit}", "torque", _three, factor, missing=""),
+        Column(f"torque range\n{unit}", "range", _three, factor, missing=""),
+    )
+
+
 PARTS = (
     Column("part", "part"),
     Column("mesh", "loaded_by", missing="", is_text=True),
@@ -89,8 +105,10 @@ def load_tables(summary: Mapping[str, Any], bins: int) -> list[Table]:
     ]
     columns = [Column("load", "load"), *(Column(m, m, _three) for m in (hub[0] if hub else ()) if m != "load")]
     return [
-        Table("Load sources", summary["sources"], SOURCES, noun="sources"),
-        Table(f"Damage-equivalent loads {years}", [*torques, *ranges], EQUIVALENTS, legend),
+        Table("Load sources", summary["sources"], _source_columns(*_torque_unit(summary)), noun="sources"),
+        Table(
+            f"Damage-equivalent loads {years}", [*torques, *ranges], _equivalent_columns(*_torque_unit(summary)), legend
+        ),
         Table(f"Damage-equivalent rotor loads {years}", hub, columns, HUB_LEGEND),
         Table("Loads on rotating parts", summary["parts"], PARTS, "Mesh force: per mesh, at the largest torque."),
     ]

@@ -36,7 +36,7 @@ from exugear.system.system import Assembly
 from fe_ste.standards.iso6336 import Edition, outside_scope
 from fe_ste.standards.pitting import UNMODIFIED, tangential_force
 from fe_ste.standards.tooth_root import root_stress_factors
-from fe_ste.tools.display import ReprMixin
+from fe_ste.tools.display import ReprMixin, torque_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -299,7 +299,7 @@ def _load_in_words(gearbox: Gearbox, counted: CountedLoads) -> str:
         count = len(counted.points.torque)
         return f"spectrum on {counted.body}: {count} loads, {hours:,.0f} h"
     source = counted.sources[0]
-    torque = f"{1e-3 * source.largest:.6g} kN m on {counted.body}"
+    torque = f"{torque_text(source.largest)} on {counted.body}"
     return f"nominal load: {torque} at {source.fastest / RPM:.4g} rpm, {hours:,.0f} h"
 
 
