@@ -450,7 +450,7 @@ class Project(ReprMixin):
 
         with np.errstate(divide="ignore"):
             measured = 20.0 * np.log10(np.abs(cuts.measured))
-        return fit_levels(levels, measured, cuts.compared, start, limits)
+        return fit_levels(levels, measured, cuts.fitted, start, limits)
 
     def measured_path(self, name: str) -> Path:
         """Return the path of the comparison with a measured run-up: next to the modes."""

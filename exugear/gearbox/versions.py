@@ -18,6 +18,6 @@ LIFE = 10
 #: Steady-state responses (`exugear.steady`, and all methods that modes use).
 STEADY = 20
 #: Comparisons with measured run-ups (`exugear.steady.evaluation`, `exugear.results.order_tracking`).
-MEASURED = 3
+MEASURED = 4
 #: Points of studies (`exugear.studies`: their outputs; the methods that these use have their own versions).
 STUDY = 4

@@ -161,10 +161,12 @@ def _speed(row: Mapping[str, Any]) -> float | None:
 
 
 def _seen(row: Mapping[str, Any]) -> str:
-    """Return which side has a peak that the other one lacks."""
+    """Return the difference in speed, or which side has a peak that the other one lacks."""
     if row["measured_speed_rpm"] is None:
         return "computed only"
-    return "measured only" if row["computed_speed_rpm"] is None else f"{row['speed_difference_percent']:+.2f}"
+    if row["computed_speed_rpm"] is None:
+        return "measured only"
+    return "jump" if row["contact_loss"] else f"{row['speed_difference_percent']:+.2f}"
 
 
 PEAKS = (

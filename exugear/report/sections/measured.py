@@ -84,7 +84,9 @@ def _row(material: ReportData, peak: dict[str, Any]) -> dict[str, object]:
         "channel": peak["channel"],
         "measured speed / rpm": number("measured_speed_rpm", ".1f"),
         "computed speed / rpm": number("computed_speed_rpm", ".1f"),
-        "difference / %": number("speed_difference_percent", "+.2f"),
+        "difference / %": Cell("jump", float("nan"))
+        if peak["contact_loss"]
+        else number("speed_difference_percent", "+.2f"),
         "measured": Cell(f"{factor * peak['measured_amplitude']:.3g} {unit}", factor * peak["measured_amplitude"]),
         "computed": Cell(f"{factor * peak['computed_amplitude']:.3g} {unit}", factor * peak["computed_amplitude"]),
         "level / dB": number("difference_dB", "+.1f"),

@@ -19,8 +19,9 @@ from exugear.results.spectra.waterfall import OrderLine
 from exugear.steady.evaluation.run_up import MeasuredChannel, MeasuredRunUp
 from exugear.steady.evaluation.swept import swept_cut
 from exugear.steady.mean_system.planet_sets import SteadyError
-from exugear.steady.peaks import line_name
+from exugear.steady.peaks import line_name, tensile_fractions
 from exugear.steady.steady_file import complex_amplitudes
+from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers, SingleComplexes
 from fe_ste.tools.display import ReprMixin
 
@@ -63,6 +64,8 @@ class PeakPair:
     measured: float
     computed: float
     """Amplitude, zero-to-peak, SI; of a peak without a partner the amplitude of the other at the same speed."""
+    contact_loss: bool = False
+    """Whether teeth lose contact at this speed: the response jumps there, at another speed in a run-down."""
 
     @property
     def paired(self) -> bool:
@@ -98,6 +101,8 @@ class ComparedCuts(ReprMixin, line=" of {run_up.name!r}: {shape}"):
     """(channels, lines, frames) steady-state response, swept and averaged likewise; NaN outside its speeds."""
     steady: Floats
     """(channels, lines, frames) amplitude of the steady-state response at the speeds, neither swept nor averaged."""
+    contact_loss: Booleans
+    """(frames,) whether teeth lose contact in the computed response at the speed."""
     limits: Floats | None = None
     """(2, channels, lines, frames) computed amplitude with the lowest and the highest plausible damping."""
 
@@ -116,6 +121,14 @@ class ComparedCuts(ReprMixin, line=" of {run_up.name!r}: {shape}"):
     def compared(self) -> Booleans:
         """Amplitudes that count, (channels, lines, frames): above background, and near the highest of the channel."""
         return self.within(COMPARED_RANGE)
+
+    @property
+    def fitted(self) -> Booleans:
+        """Amplitudes that count and from which a fit or a shift of resonances may follow: where teeth stay in contact.
+
+        Where they lose contact, a resonance bends and the response jumps, at other speeds in a run-up and a run-down.
+        """
+        return self.compared & ~self.contact_loss
 
     def within(self, levels: float) -> Booleans:
         """Amplitudes above background, and down to so many dB below the highest of the channel."""
@@ -207,8 +220,23 @@ def compared_cuts(run_up: MeasuredRunUp, response: xr.Dataset, limits: SingleCom
         background=median_filter(np.abs(found[:, len(lines) :]), (1, 1, SMOOTHED), mode="nearest"),
         computed=swept[0],
         steady=np.where(inside, steady, np.nan),
+        contact_loss=np.interp(frames.speed, *_contact_loss(response)) > 0.0,
         limits=None if limits is None else np.abs(swept[1:]),
     )
+
+
+def _contact_loss(response: xr.Dataset) -> tuple[Floats, Floats]:
+    """Return ascending speeds of a response, rad/s without sign, and 1 where teeth lose contact or would have to pull.
+
+    A bilateral mesh model transmits tension where teeth lose contact in reality.
+    """
+    lost = np.nan_to_num(response["contact_loss_fraction"].to_numpy()).max(axis=1, initial=0.0) > 0.0
+    if not LAWS[str(response.attrs["mesh_model"])].loses_contact:
+        for fraction in tensile_fractions(response).values():
+            lost |= fraction > 0.0
+    speed = np.abs(response["speed"].to_numpy())
+    order = np.argsort(speed, kind="stable")
+    return speed[order], lost[order].astype(np.float64)
 
 
 def swept_lines(
@@ -306,7 +334,7 @@ def best_stretch(cuts: ComparedCuts) -> float:
     """
     order = np.argsort(cuts.speed)
     speed = cuts.speed[order]
-    compared = cuts.compared[:, :, order]
+    compared = cuts.fitted[:, :, order]
     with np.errstate(divide="ignore"):
         measured, computed = (20.0 * np.log10(np.abs(a))[:, :, order] for a in (cuts.measured, cuts.computed))
     best, least = 1.0, math.inf
@@ -367,6 +395,7 @@ def paired_peaks(cuts: ComparedCuts, stretch: float) -> tuple[PeakPair, ...]:
                     math.nan if two is None else two.speed,
                     float(measured[line, at]) if one is None else one.amplitude,
                     float(computed[line, at]) if two is None else two.amplitude,
+                    bool(cuts.contact_loss[known[-1].frame]),
                 )
                 if math.isfinite(pair.difference):
                     found.append((pair.computed / own_top if one is None else pair.measured / top, pair))
@@ -376,13 +405,15 @@ def paired_peaks(cuts: ComparedCuts, stretch: float) -> tuple[PeakPair, ...]:
 def resonance_shift(peaks: Sequence[PeakPair], stretch: float) -> float:
     """Return computed over measured speed of resonances minus 1: the median of three or more pairs, or of the stretch.
 
+    Pairs at speeds where teeth lose contact do not count.
+
     Examples
     --------
     >>> peaks = [PeakPair(0, 0, 100.0, speed, 1.0, 1.0) for speed in (104.0, 105.0, 109.0)]
     >>> round(resonance_shift(peaks, 1.0), 6), resonance_shift(peaks[:2], 0.8)
     (0.05, 0.25)
     """
-    shifts = [peak.speed_difference for peak in peaks if peak.paired]
+    shifts = [peak.speed_difference for peak in peaks if peak.paired and not peak.contact_loss]
     return float(np.median(shifts)) if len(shifts) >= 3 else 1.0 / stretch - 1.0
 
 

@@ -34,6 +34,7 @@ from exugear.steady.evaluation.mistakes import (
     coverage_finding,
     drift_finding,
     foreign_finding,
+    jump_finding,
     level_findings,
     load_finding,
     measured_foreign_orders,
@@ -212,6 +213,7 @@ class MeasuredComparison(ReprMixin):
             "measured_amplitude": peak.measured,
             "computed_amplitude": peak.computed,
             "difference_dB": _known(peak.difference),
+            "contact_loss": peak.contact_loss,
         }
 
     def write(self, path: Path) -> tuple[Path, ...]:
@@ -324,6 +326,7 @@ PEAK_HEADINGS = (
     "measured_amplitude",
     "computed_amplitude",
     "difference_dB",
+    "contact_loss",
 )
 
 
@@ -362,6 +365,7 @@ def compare_run_up(
         foreign_finding(foreign, run_up),
         coverage_finding(cuts),
         shift_finding(resonance_shift(peaks, stretch)),
+        jump_finding(cuts, peaks),
     )
     return MeasuredComparison(
         cuts=cuts,

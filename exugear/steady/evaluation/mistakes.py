@@ -26,7 +26,7 @@ from exugear.results.order_tracking.foreign_orders import (
     order_spectrum,
     standing_orders,
 )
-from exugear.steady.evaluation.comparison import ComparedCuts
+from exugear.steady.evaluation.comparison import ComparedCuts, PeakPair
 from exugear.steady.evaluation.load_over_speed import loads_of
 from exugear.steady.evaluation.run_up import INTEGRATIONS, MeasuredRunUp
 from exugear.steady.settings import Method
@@ -265,6 +265,21 @@ def shift_finding(shift: float) -> Iterator[Finding]:
             f"computed resonances are {100.0 * abs(shift):.1f} % too {'high' if shift > 0.0 else 'low'}: check "
             "stiffness, such as housing.factor, and inertias before damping",
             shift,
+        )
+
+
+def jump_finding(cuts: ComparedCuts, peaks: Sequence[PeakPair]) -> Iterator[Finding]:
+    """Yield a warning if teeth lose contact at speeds of peaks: the response jumps there."""
+    lost = [peak for peak in peaks if peak.contact_loss]
+    if lost:
+        first = lost[0]
+        speed = first.measured_speed if math.isnan(first.computed_speed) else first.computed_speed
+        yield Finding(
+            "warning",
+            f"teeth lose contact at {len(lost)} of {len(peaks)} peaks, first {cuts.lines[first.line].name} at "
+            f"{speed / RPM:.0f} rpm: the response jumps there, at another speed in a run-up than in a run-down; such "
+            "peaks do not count for the shift of resonances, and a fit omits these speeds",
+            float(len(lost)),
         )
 
 
