@@ -33,9 +33,10 @@ def highest_resonance(gearbox: Gearbox, ranking: Ranking) -> str:
     quantity = ranking.quantity
     label = QUANTITIES[quantity]
     at = f"{first[f'{quantity}_at']}, " if f"{quantity}_at" in first else ""
+    order = _order(gearbox).cell(first).replace(" × ", f"{HARD_SPACE}×{HARD_SPACE}")
     return (
         f"Highest {label.column} ±{_amplitude(quantity, first)} {label.unit}: {at}{SPEED.cell(first)} rpm, "
-        f"{FREQUENCY.cell(first)} Hz, {_order(gearbox).cell(first)}"
+        f"{FREQUENCY.cell(first)} Hz, {order}"
     )
 
 

@@ -43,6 +43,8 @@ from fe_ste.tools.arrays import Floats
 
 LAMINAE = 40
 """Number of roller laminae for the roller loads; 60 change the life by 0.1 %."""
+UNLOADED = 1e-9
+"""Load over static load rating below which a load is round-off."""
 LOAD_SHARES = (0.15, 0.3, 0.5, 0.7, 0.85, 1.0)
 """Fractions of the largest load at which roller loads are solved; lives are interpolated linearly in logarithms."""
 
@@ -180,7 +182,7 @@ class _RatedBearing:
                 f"viscosity ratio {ratio:.2g} at the lowest speed: ISO 281 has no a_ISO below {LEAST_RATIO:g}; L10m "
                 "contains its minimum there, a_ISO = 0.1"
             )
-        if largest < least:
+        if UNLOADED * ratings.static < largest < least:
             remarks.append(f"load at most {1e-3 * largest:.3g} kN, below the usual minimum load: elements may slide")
         if ratings.estimated:
             remarks.append("ratings estimated from its dimensions (conservative)")
@@ -228,8 +230,8 @@ class _RatedBearing:
             self.balance.bearing_tilt.of(self.number), points.torque[t : t + 1], points.other[t : t + 1]
         )
         load, tilt, top = loads[t, a], tilts[0, a], np.hypot(worst[..., 0], worst[..., 1]).max()
-        if not size[t, a]:
-            return None, math.nan, ["no load"]
+        if not size[t, a] or np.abs(worst[..., :3]).max() < UNLOADED * ratings.static:
+            return None, math.nan, ["no load: elements may slide"]
         holds_axially = any(row.contact_angle for row in rows) or not isinstance(rows[0], RollerRow)
         remarks = []
         if not holds_axially and abs(load[2]) > 0.01 * size[t, a]:

@@ -200,7 +200,7 @@ def measured(
         typer.Option(
             "--write",
             metavar="FILE",
-            help="Write the gearbox file with the fitted numbers to a new file beside it; comments are kept.",
+            help="Write the gearbox file with the fitted numbers to a new file in the same folder; comments are kept.",
             show_default=False,
         ),
     ] = None,

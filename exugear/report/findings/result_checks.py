@@ -75,7 +75,8 @@ def validity_checks(context: Context, group: RunGroup) -> tuple[Finding, ...]:
     if rated is None:
         verdicts.append(Finding("warning", "no rated speed; set rated_speed_rpm in [operation]"))
     elif fastest > BEYOND_RATED * rated:
-        verdicts.append(Finding("warning", f"speeds up to {figure_text(fastest / rated, 2)} times the rated speed"))
+        text = f"the highest computed speed is {figure_text(fastest / rated, 2)} times the rated speed"
+        verdicts.append(Finding("warning", f"{text}; speeds outside the operating range are not ranked"))
     return tuple(sorted(verdicts, key=lambda own: not own.passed))
 
 
