@@ -1,4 +1,4 @@
-"""GRC 750 kW gearbox with elastic shafts, carrier and housing on its bearings, beside the variants rigid and bushing.
+"""GRC 750 kW gearbox with flexible shafts, carrier and housing on its bearings, next to the variants rigid and bushing.
 
     python cases/grc750/flexible.py [results folder]
 
@@ -58,8 +58,8 @@ def main() -> None:
     projects = {variant: project.chosen(variant=variant) for variant in VARIANTS}
     modes = {variant: chosen.modes() for variant, chosen in projects.items()}
     shafts = modes_of_varied(project, SHAFTS_ALONE)
-    print_modes(modes["bushing"], shafts, "bushing -> elastic shafts")
-    print_modes(shafts, modes["flexible"], "elastic shafts -> carrier and housing elastic, too", SOLIDS_EXACT)
+    print_modes(modes["bushing"], shafts, "bushing -> flexible shafts")
+    print_modes(shafts, modes["flexible"], "flexible shafts -> carrier and housing flexible, too", SOLIDS_EXACT)
     with_main_shaft = modes_of_varied(project, MAIN_SHAFT)
     print_modes(modes["flexible"], with_main_shaft, "flexible -> flexible with main shaft and rotor", MAIN_SHAFT_MODES)
     print_misalignments(project)
@@ -112,10 +112,10 @@ def print_modes(before: Modes, after: Modes, title: str, highest: float = np.inf
 
 
 def print_misalignments(project: Project) -> None:
-    """Print the misalignment of each mesh under the static load, output locked, for more and more elastic bodies."""
+    """Print the misalignment of each mesh under the static load, output locked, for more and more flexible bodies."""
     print("misalignment under 240 kN m, output locked, rad / 1e6")
     print_misalignment("bushing", varied(project, SHAFTS_ALONE, "bushing"))
-    for name, changes in (("elastic shafts", SHAFTS_ALONE), ("all elastic", {})):
+    for name, changes in (("flexible shafts", SHAFTS_ALONE), ("all flexible", {})):
         for more, shaft in (("", {}), (", main shaft", MAIN_SHAFT)):
             print_misalignment(f"{name}{more}", varied(project, {**changes, **shaft}))
             print_misalignment(f"{name}{more}, gravity on", varied(project, {**changes, **shaft, **WEIGHT}))
