@@ -170,12 +170,19 @@ def parse_case(content: dict[str, Any], source: str) -> GearboxFile:
 
     Examples
     --------
+    >>> parse_case({"case": "x.toml", "outputs": {}}, "x.study.toml")
+    Traceback (most recent call last):
+    ...
+    exugear.gearbox.reading.GearboxFileError: x.study.toml: is a study file; run it by exugear study, or specify ...
     >>> parse_case({"name": 3}, "x.toml")
     Traceback (most recent call last):
     ...
     exugear.gearbox.reading.GearboxFileError: x.toml: name = 3: must be text in quotes
     x.toml: overall: this key is missing; for example overall = { input = "carrier", output = "hss", ...
     """
+    if {"case", "outputs"} <= content.keys():
+        what = "is a study file; run it by exugear study, or specify the gearbox file that it names as case"
+        raise GearboxFileError(error_line(source, what))
     try:
         return GearboxFile.model_validate(content)
     except ValidationError as error:

@@ -349,6 +349,10 @@ def parse_study(content: dict[str, Any], source: str) -> StudyFile:
 
     Examples
     --------
+    >>> parse_study({"bodies": {}, "static_load": {}}, "g.toml")
+    Traceback (most recent call last):
+    ...
+    exugear.studies.sections.StudyError: g.toml: is a gearbox file; specify a study file, which names it as case
     >>> parse_study({"name": "a", "case": "b.toml", "parameters": {}, "output": {}}, "s.toml")
     Traceback (most recent call last):
     ...
@@ -356,6 +360,8 @@ def parse_study(content: dict[str, Any], source: str) -> StudyFile:
     s.toml: outputs: this key is missing
     s.toml: output: unknown key; did you mean 'outputs'?
     """
+    if {"bodies", "static_load"} <= content.keys():
+        raise StudyError(error_line(source, "is a gearbox file; specify a study file, which names it as case"))
     try:
         return StudyFile.model_validate(content)
     except ValidationError as error:

@@ -94,7 +94,7 @@ def modes(
     whole: options.AllOption = False,
     as_json: options.JsonOption = False,
 ) -> None:
-    """Compute eigenmodes and a Campbell diagram.
+    """Compute natural frequencies, mode shapes and a Campbell diagram.
 
     The variant is linearised at the static load. Transmission error tables that are missing or out of date are computed
     first.

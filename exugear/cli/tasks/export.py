@@ -130,7 +130,7 @@ def export_loads(
     try:
         data = load_response(response)
     except FileError as error:
-        raise BadInputError(f"--loads {error}; name a file that exugear steady has written") from error
+        raise BadInputError(f"--loads {error}; specify a file that exugear steady has written") from error
     speeds = data["speed"].to_numpy()
     points = range(len(speeds)) if speed is None else [_nearest(speeds, speed)]
     numbers = _numbers(gearbox, loaded_seats(gearbox, data))
@@ -177,7 +177,7 @@ def export_surface(
     try:
         data = load_response(response)
     except FileError as error:
-        raise BadInputError(f"--surface {error}; name a file that exugear steady has written") from error
+        raise BadInputError(f"--surface {error}; specify a file that exugear steady has written") from error
     choice = choice_of(data.attrs)
     point = _nearest(data["speed"].to_numpy(), speed)
     variant = Variant.of(choice.variant)

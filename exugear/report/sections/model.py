@@ -74,7 +74,7 @@ GLOSSARY = {
     "rigid housing.",
     "window-dependent": "Of a resonance: found with some window lengths of the analysis but not with all.",
     "steady-state response": "Vibration at constant speed, the limit of an infinitely slow run-up.",
-    "Campbell diagram": "Eigenfrequencies over speed, with the orders that can excite them.",
+    "Campbell diagram": "Natural frequencies over speed, with the orders that can excite them.",
     "whirl": "Orbital motion of a shaft axis, forward or backward relative to its rotation.",
     "sideband": "Spectral component next to a dominant one, offset by another frequency such as the carrier frequency.",
     "L10, L10r": "Rating life reached by 90 % of bearings: to ISO 281, and to ISO/TS 16281 from element loads.",

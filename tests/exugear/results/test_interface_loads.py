@@ -206,4 +206,4 @@ def test_the_command_writes_table_and_cards_and_refuses_other_speeds(tmp_path: P
     assert "--speed 700: not computed; the response has 3 speeds, the nearest is 600 rpm" in refused(
         "--loads", stored, "--speed", "700"
     )
-    assert "no such file; name a file that exugear steady has written" in refused("--loads", tmp_path / "none.nc")
+    assert "no such file; specify a file that exugear steady has written" in refused("--loads", tmp_path / "none.nc")
