@@ -61,7 +61,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
     """Say loudly what was not looked at: a skipped browser must not pass for a passed one."""
-    skipped = [report for report in terminalreporter.stats.get("skipped", []) if "browser" in report.keywords]
+    # A module skipped as a whole has no keywords.
+    reports = [(report, getattr(report, "keywords", ())) for report in terminalreporter.stats.get("skipped", [])]
+    skipped = [report for report, keywords in reports if "browser" in keywords]
     if skipped:
         words = f"NOT TESTED: {len(skipped)} claims about the pages, for want of a browser (chromium and playwright)"
         terminalreporter.write_line(words, red=True, bold=True)

@@ -27,7 +27,7 @@ version = release
 
 extensions = [
     "myst_parser",
-    "numpydoc",
+    "docstrings",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
     "sphinx.ext.mathjax",
@@ -55,6 +55,7 @@ smartquotes = False
 autosummary_generate = False
 autodoc_member_order = "bysource"
 autodoc_docstring_signature = False  # signatures come from the code, not from docstrings
+autodoc_use_type_comments = False
 autodoc_typehints = "signature"  # docstrings add shapes, units and meaning
 autodoc_type_aliases = {name: name for name in arrays.__all__}  # Floats, not its long form
 # A type name that several modules have, such as LoadCase, is linked to one of them.

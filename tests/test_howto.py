@@ -26,7 +26,7 @@ START = "exugear new my/gearbox.toml"
 BLOCK = re.compile(
     r"^( *)```(sh|python)\n(.*?)^\1```$((?:\s*<!-- (?:expect|exit|picture): .*? -->)*)", re.MULTILINE | re.DOTALL
 )
-QUICK = ("catalogue_bearings", "editor_in_the_browser", "python", "untrusted_files")
+QUICK = ("editor_in_the_browser", "untrusted_files")
 LONG = (
     "damping",
     "drive_with_duty_cycle",

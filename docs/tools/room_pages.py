@@ -39,7 +39,7 @@ def rooms() -> dict[str, list[Path]]:
     for package in PACKAGES:
         for file in sorted((ROOT / package).rglob("*.py")):
             name = ".".join(file.parent.relative_to(ROOT).parts)
-            if file.name != "__init__.py":
+            if file.stem not in ("__init__", "__main__"):
                 found.setdefault(name, []).append(file)
     return dict(sorted(found.items()))
 

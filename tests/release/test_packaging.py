@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 import tomllib
@@ -12,6 +13,8 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent.parent
+FOR_DEVELOPERS = ("all", "dev", "docs", "release")
+"""Extras without functions of their own for users."""
 
 
 def test_every_file_beside_the_modules_is_installed_with_them():
@@ -59,3 +62,17 @@ def test_a_type_checker_elsewhere_finds_both_packages_in_the_editable_install(tm
         'use.py:3: error: Incompatible types in assignment (expression has type "int", variable has type "str")  '
         "[assignment]"
     ]
+
+
+def test_the_installed_size_is_listed_for_each_extra_and_counts_each_package_once():
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    program = [sys.executable, str(ROOT / "packaging" / "installed_size.py")]
+    printed = subprocess.run(program, capture_output=True, text=True, check=True).stdout.splitlines()
+    extras = [
+        name for name in settings["project"]["optional-dependencies"] if name not in ("all", "dev", "docs", "release")
+    ]
+    assert [line.partition(":")[0] for line in printed] == ["exugear without extras", *extras]
+    size, packages = map(int, re.search(r": (\d+) MB, (\d+) packages", printed[0]).groups())
+    # Each of its direct requirements, and NumPy and SciPy alone are larger than this.
+    assert packages >= len(settings["project"]["dependencies"])
+    assert size > 150

@@ -27,6 +27,7 @@ from exugear.transient.outcome import LimitError, Run, RunError
 from exugear.transient.plan import EXPECTATIONS, check_disk, check_duration, rate_for, sample_bytes
 from exugear.transient.runup import BAND
 from exugear.transient.start import kept_band, kept_duration, refuse_if_busy, refuse_shorter, refuse_to_resume
+from fe_ste.tools.arrays import Floats
 from fe_ste.tools.files import FileError
 
 
@@ -203,12 +204,12 @@ def _outcome(
         raise StoppedError(
             f"at {finished.end:.3f} s; results so far are kept in {finished.path}; resume with:\n{command}{so_far}"
         )
-    summary = {"case": case, **summarise(finished)}
+    data, attributes = read_run(finished.path, ("input_speed", *MESH_TIMES, *BALANCE_TERMS))
+    times = {name: float(np.max(data[name], initial=0.0)) for name in MESH_TIMES}  # a rotor has no meshes
+    summary = {"case": case, **_summary(finished, data, attributes, times)}
     if comparison is not None:
         summary["apart_from_exudyn"] = comparison.difference
     unknown = {key for key, value in summary.items() if isinstance(value, float) and not math.isfinite(value)}
-    data, attributes = read_run(finished.path, MESH_TIMES)
-    times = {name: float(np.max(data[name], initial=0.0)) for name in MESH_TIMES}  # a rotor has no meshes
     found = run_findings(attributes, summary["energy_not_accounted_for"], times)
     failure = ""
     if not finished.trusted:
@@ -225,10 +226,10 @@ def _outcome(
     )
 
 
-def summarise(finished: Run) -> dict[str, Any]:
-    """Summarise a run, with units in the keys."""
-    data, attributes = read_run(finished.path, ("input_speed", *MESH_TIMES, *BALANCE_TERMS))
-    longest = {name: float(np.max(data[name], initial=0.0)) for name in MESH_TIMES}  # a rotor has no meshes
+def _summary(
+    finished: Run, data: Mapping[str, Floats], attributes: Mapping[str, Any], longest: Mapping[str, float]
+) -> dict[str, Any]:
+    """Summarise a run by its data, its attributes and the longest times of its meshes, with units in the keys."""
     return {
         **{key: str(attributes[key]) for key in ("variant", "load_case", "mesh_model", "inertias", "solver")},
         "file": str(finished.path),

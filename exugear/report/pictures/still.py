@@ -95,10 +95,14 @@ def _layer(samples: Sequence[tuple[Floats, Floats, Floats]], pixels: int) -> tup
     place, motion, bright = (np.concatenate(parts) for parts in zip(*samples, strict=True))
     column, row = np.clip(np.round(0.5 * pixels + place[:, :2] * (1.0, -1.0)).astype(int), 0, pixels - 1).T
     order = np.argsort(place[:, 2])
-    colour = LinearSegmentedColormap.from_list("displacement", DISPLACEMENT_COLOURS)(np.clip(motion, 0.0, 1.0))
-    colour[:, :3] *= bright[:, None]
-    picture[row[order], column[order]] = colour[order]
-    depth[row[order], column[order]] = place[order, 2]
+    nearest = np.full(pixels * pixels, -1)
+    nearest[(row * pixels + column)[order]] = order
+    filled = np.flatnonzero(nearest >= 0)
+    shown = nearest[filled]
+    colour = LinearSegmentedColormap.from_list("displacement", DISPLACEMENT_COLOURS)(np.clip(motion[shown], 0.0, 1.0))
+    colour[:, :3] *= bright[shown, None]
+    picture.reshape(-1, 4)[filled] = colour
+    depth.reshape(-1)[filled] = place[shown, 2]
     return picture, depth
 
 

@@ -143,7 +143,7 @@ class ArrayStore:
     {'blob': 'a0', 'type': 'u8', 'shape': [3], 'differences': True}
     """
 
-    def __init__(self, prefix: str = "a", level: int = 9) -> None:
+    def __init__(self, prefix: str = "a", level: int = 6) -> None:
         self._prefix = prefix
         self._level = level
         self._packed: list[str] = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
@@ -91,7 +91,7 @@ class Table:
     kinds: Sequence[str] = ()
     """CSS class of each row, such as ``further`` for rows behind a control."""
 
-    @property
+    @cached_property
     def columns(self) -> dict[str, str]:
         """CSS classes by heading."""
         return {

@@ -43,6 +43,7 @@ from exugear.system.modal_damping import damping_in_words
 from exugear.system.operating_points import bearing_duties
 from exugear.system.tooth_mesh.tables import wanted_table
 
+from ...optional_libraries import needs_meshio
 from ..cases import gear_trains
 from ..cases.case_mutations import bases, toml_text
 
@@ -100,6 +101,7 @@ def read_keys(monkeypatch: pytest.MonkeyPatch) -> set[tuple[str, str]]:
     return found
 
 
+@needs_meshio
 def test_every_key_is_read(read_keys: set[tuple[str, str]], tmp_path: Path) -> None:
     catalogue_stiffness.cache_clear()  # what other tests had computed would not be read again
     contents = bases(tmp_path)

@@ -124,6 +124,7 @@ def test_every_speed_of_a_sweep_has_a_state_or_says_that_its_motion_does_not_rep
 
 
 # Amplitudes to 1e-3 and lines to 2e-3 are asked for at resonances.
+@pytest.mark.validation
 @pytest.mark.sample
 @pytest.mark.parametrize(
     ("name", "share"),

@@ -137,6 +137,7 @@ def test_arrays_that_do_not_fit_are_refused():
 
 
 def test_missing_opengl_is_an_error_that_names_the_packages(monkeypatch):
+    pytest.importorskip("pyvista", reason="pyvista (extra pictures) is missing")
     monkeypatch.setattr(drawing, "_probe_rendering", lambda: False)
     with pytest.raises(RenderingError, match=r"libegl1 .*libosmesa6"):
         require_rendering()

@@ -47,6 +47,7 @@ def test_contact_forces_balance_the_torque_on_both_gears(solved):
     assert np.abs(force.sum(axis=0)).max() < 1e-9 * np.abs(force).sum()
 
 
+@pytest.mark.validation
 def test_pressures_push_and_sum_to_the_normal_force(solved):
     found = solved.equilibrium
     assert found.pressure.min() >= 0

@@ -48,6 +48,7 @@ def test_a_table_says_what_it_is_and_names_its_units(path):
     assert len(data.attrs["convergence"].splitlines()) == 2 * 2 + int(data["iterations"].sum())
 
 
+@pytest.mark.validation
 def test_a_table_is_refused_for_another_input_and_as_one_of_the_superelement(path, tmp_path):
     with pytest.raises(TableError, match="another input"):
         NonlinearTable.open(path, dataclasses.replace(WANTED, torque=101.0))
@@ -60,6 +61,7 @@ def test_a_table_is_refused_for_another_input_and_as_one_of_the_superelement(pat
         NonlinearTable.open(tmp_path / "text.nc")
 
 
+@pytest.mark.validation
 def test_no_damaged_table_is_used(path, tmp_path):
     copy = tmp_path / "pair-nonlinear.nc"
     for damaged in damages(path.read_bytes(), 100):
