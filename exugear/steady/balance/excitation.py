@@ -63,8 +63,9 @@ from exugear.steady.mean_system.signals import (
     quantities_of,
     signal_rows,
 )
-from exugear.steady.mean_system.standing_loads import gear_load_rows, moment_supports
-from exugear.steady.mean_system.tooth_friction import tooth_friction
+from exugear.steady.mean_system.standing_loads import gear_load_rows, moment_supports, reacting_excitations
+from exugear.steady.mean_system.tooth_friction import friction_parts, tooth_friction
+from exugear.system.kernels.coordinates import BODY_SIZE
 from exugear.system.kernels.meshes import SPIN_1
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
@@ -231,8 +232,13 @@ class HarmonicBalanceModel:
         return bearings, np.asarray(first + len(AXES) * places[:, None] + np.arange(2))
 
     @cached_property
-    def gear_load_rows(self) -> tuple[Floats, Floats]:
-        """Loads of the gears that stand still per unit of each wave's force and moment, (m, 6 gears) each."""
+    def reacting_excitations(self) -> tuple[str, ...]:
+        """Excitations with reactions on fixed bodies; r of them."""
+        return reacting_excitations(self.waves.assembly.gearbox)
+
+    @cached_property
+    def gear_load_rows(self) -> tuple[Floats, Floats, Floats]:
+        """Loads of the gears that stand still per unit of what acts on each wave, as `gear_load_rows` has them."""
         return gear_load_rows(self.waves)
 
     @cached_property
@@ -652,15 +658,34 @@ class HarmonicBalanceModel:
         return np.array([tooth_friction(self.waves, self.lines, self.ports_at(s), s, self.harmonics) for s in speeds])
 
     @cached_property
+    def _friction_on_gears(self) -> Complexes:
+        """Loads (3, n, 6 gears) on gears that stand still by the friction of teeth at the three speeds."""
+        rows = self.gear_load_rows[-1]
+        speeds = map(float, self.system.speeds)
+        parts = [friction_parts(self.waves, self.lines, self.ports_at(s), s, self.harmonics) for s in speeds]
+        return np.array([np.tensordot(own, rows, axes=2) for own in parts])
+
+    def friction_on_gears(self, speed: float) -> Complexes | float:
+        """Find loads (n, 6 gears) of the friction of teeth on standing gears at a speed (rad/s); 0 without any."""
+        if not (self._friction.size and self.gear_load_rows[-1].size):
+            return 0.0
+        return np.asarray(self.system.at(self._friction_on_gears, speed))
+
+    @cached_property
     def _shaft_places(self) -> Places:
         """Places of the terms of the orders of shafts among the lines."""
         return self.shaft_orders.places(self.lines)
 
     def shaft_loads(self, speed: float, source: str | None = None) -> Complexes:
         """Generalized forces (n, size) of deviations and stated loads at the lines, or those of one excitation."""
+        return self._shaft_loads(speed, source)[:, : self.system.size]
+
+    def _shaft_loads(self, speed: float, source: str | None = None) -> Complexes:
+        """Return the same with the reactions on fixed bodies behind them (n, size + 6 r)."""
         orders = self.shaft_orders
         if not orders.sidebands:
-            return np.zeros((len(self.lines.index), self.system.size), dtype=complex)
+            size = self.system.size + BODY_SIZE * len(self.reacting_excitations)
+            return np.zeros((len(self.lines.index), size), dtype=complex)
         counted = np.array([source in (None, name) for name in orders.source])
         reaction = orders.reaction_at(speed, self.system.static_at(speed)) * counted[:, None]
         return at_lines(reaction, self._shaft_places, len(self.lines.index), speed)
@@ -683,14 +708,16 @@ class HarmonicBalanceModel:
         """Solve for the response to these loads at a speed of the input, rad/s; None without any."""
         if not (self._friction.size or self.shaft_orders.sidebands):
             return None
-        loads = self.shaft_loads(speed)
-        if self._friction.size:
-            loads += self.system.at(self._friction, speed)
-        return self._response_to(loads, pencil, frequencies)
+        return self._response_to(self._shaft_loads(speed), speed, pencil, frequencies)
 
-    def _response_to(self, loads: Complexes, pencil: tuple[Floats, Floats], frequencies: Floats) -> LoadResponse:
-        """Solve for the response to loads (n, size) in the rotating frame, with stiffness and damping at a speed."""
+    def _response_to(
+        self, stated: Complexes, speed: float, pencil: tuple[Floats, Floats], frequencies: Floats
+    ) -> LoadResponse:
+        """Solve for the response to friction and to loads with reactions (n, size + 6 r), with a pencil at a speed."""
         system = self.system
+        loads = stated[:, : system.size].copy()
+        if self._friction.size:
+            loads += system.at(self._friction, speed)
         motion = np.zeros(loads.shape, dtype=complex)
         still = system.still(pencil[0], loads[0].real[:, None])[:, 0]
         motion[0] = still[:-1]
@@ -699,18 +726,16 @@ class HarmonicBalanceModel:
         motion[acting] = np.linalg.solve(pencil[0] - w**2 * system.mass + 1j * w * pencil[1], loads[acting, :, None])[
             ..., 0
         ]
-        return LoadResponse(loads, motion, float(still[-1]))
+        return LoadResponse(loads, motion, float(still[-1]), stated[:, system.size :])
 
     def with_turned_loads(self, interface: Interface, motion: Complexes) -> Interface:
         """Return the interface with stated loads at the angles to which a motion (n, size) turns their bodies."""
         speed = interface.speed
         system = self.system
         change = self.shaft_orders.change_by_turning(self.sampling, motion, speed, system.static_at(speed))
-        loads = self.shaft_loads(speed) + self.sampling.coefficients(change)
-        if self._friction.size:
-            loads += system.at(self._friction, speed)
+        loads = self._shaft_loads(speed) + self.sampling.coefficients(change)
         pencil = system.stiffness_at(speed), system.damping_at(speed)
-        return replace(interface, loads=self._response_to(loads, pencil, interface.frequencies))
+        return replace(interface, loads=self._response_to(loads, speed, pencil, interface.frequencies))
 
     def _bearings_at(self, speed: float) -> BearingMean | None:
         """Nonlinear bearings in the averaged system at a speed of the input, rad/s; None without any."""

@@ -27,6 +27,7 @@ from exugear.steady.harmonics.linear_solvers import solve_lines
 from exugear.steady.harmonics.lines import add_answered, flat
 from exugear.steady.mean_system.bearing_waves import TILTS
 from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, POSITION, CycleFunctions, MeshInterface
+from exugear.system.kernels.coordinates import BODY_SIZE
 from exugear.system.kernels.meshes import TILT_DAMPING, TILT_STIFFNESS
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.bundles import cached_bundle
@@ -377,6 +378,9 @@ def signals(model: HarmonicBalanceModel, response: Response) -> Complexes:
     if model.shaft_orders.sidebands:
         deflection = deflection - model.deviations(interface.speed)
     found = [of_motion, deflection, response.force[:, model.waves.force_waves], _gear_loads(model, response)]
+    if model.reacting_excitations:
+        none = np.zeros((len(of_motion), BODY_SIZE * len(model.reacting_excitations)), dtype=complex)
+        found.append(none if interface.loads is None else interface.loads.reactions)
     if model.radiated is not None:
         # A line of a coefficient c oscillates with the amplitude 2 c.
         velocity = model.radiated.surface_velocity(2.0 * response.motion, interface.frequencies)
@@ -385,12 +389,12 @@ def signals(model: HarmonicBalanceModel, response: Response) -> Complexes:
 
 
 def _gear_loads(model: HarmonicBalanceModel, response: Response) -> Complexes:
-    """Find the forces and moments (n, 6 gears) of the meshes on gears that stand still.
+    """Find the forces and moments (n, 6 gears) of the meshes and their friction on gears that stand still.
 
     Of the model `table` only the forces along the line of action are included.
     """
-    by_force, by_moment = model.gear_load_rows
-    found = response.force @ by_force
+    by_force, by_moment, _ = model.gear_load_rows
+    found = response.force @ by_force + model.friction_on_gears(response.interface.speed)
     waves = model.waves
     tilt = waves.assembly.meshes.tilt[[wave.first for wave in waves.waves]]
     if by_moment.any() and tilt[:, TILT_STIFFNESS].any():
