@@ -75,9 +75,12 @@ class Interface:
 
     @cached_property
     def deflection_per_force(self) -> Complexes:
-        """What laws along a row read along what they push along, (n, m f, m f), under a unit of each force."""
+        """What laws along a row read along what they push along, (n, m f, m f), under a unit of each force.
+
+        They do not read rates.
+        """
         lines, waves, forces = self.motion.shape[0], *self.motion.shape[2:]
-        read = self.readings[:, :waves, :forces]
+        read = _taken(self.ports.readings[:, :forces], self.motion)
         return np.ascontiguousarray(read).reshape(lines, waves * forces, waves * forces)
 
     @cached_property

@@ -154,7 +154,7 @@ class MovingPositions:
         self._model = model
         self._interface = interface
         self._shape = len(model.lines.index), *ports.forces.shape[:2]
-        self._slopes = model.slopes_over_cycle.at(ports, interface.speed)
+        self._slopes = flat(model.slopes_over_cycle.at(ports, interface.speed))
         waves = model.waves.waves
         self._lines, self._coupling = model.slow_shifts
         self._rows = np.ascontiguousarray(ports.readings[: self._shape[1], POSITION].T)
@@ -185,7 +185,7 @@ class MovingPositions:
             return found
         along = np.zeros(self._shape, dtype=complex)
         along[..., DEFLECTION] = deflections - model.deviations(interface.speed)
-        changes = model.coupling.of(self._slopes, along.reshape(len(along), -1)).reshape(self._shape) + self._pulls
+        changes = model.coupling.of_flat(self._slopes, along.reshape(len(along), -1)).reshape(self._shape) + self._pulls
         shifts = np.concatenate([positions, positions.conj()])
         products = np.zeros((len(shifts), self._shape[1], self._shape[1]), dtype=complex)
         for n, at in enumerate(self._mean):
@@ -240,10 +240,13 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
     for again in reversed(range(1 + (POSITIONS_REPEATED if repeated else 0))):
         whole = (given + moved).reshape(shape[0], -1)
         start = still - (answers @ whole[..., None])[..., 0]
-        found, more = balance.solve(start, found)
+        before = found
+        found, more = balance.solve(start, before)
         products += more
         excess = whole + balance.forces(found)
         deflection = (found / lengths).reshape(shape)[..., DEFLECTION]
+        if before is not None and model.ring is None and _is_settled(found, before):
+            break
         if again and positions is not None:
             moved = positions.forces(deflection, excess)
         if again and model.ring is not None:
@@ -252,6 +255,16 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
             balance = LineBalance(model, shifted, answers, passing)
             given = given_forces(model, shifted) + deviation_forces(model, shifted, passing)
     return _response(model, interface, deflection, excess.reshape(shape), products)
+
+
+def _is_settled(found: Complexes, before: Complexes) -> bool:
+    """Return whether positions that move with a solution would change it by less than the residual.
+
+    Their forces are products of deflections and positions: a relative change c of both changes them by 2 c, and these
+    forces have themselves changed the solution by c.
+    """
+    change = float(np.linalg.norm(found - before) / np.linalg.norm(found))
+    return 2.0 * change**2 < TOLERANCE
 
 
 class LineBalance:
@@ -278,7 +291,8 @@ class LineBalance:
             for function, group in zip(functions, self._coupling.groups, strict=True)
         ]
         self._answers = answers
-        self._parts = *flat(self._functions), *flat([answers])
+        self._flat = flat(self._functions)
+        self._parts = *self._flat, *flat([answers])
         self._memory = self._coupling.memory()
         self._octets = np.empty(2 * SIZE)
         self.passing = passing
@@ -296,7 +310,7 @@ class LineBalance:
 
     def forces(self, readings: Complexes) -> Complexes:
         """Return the forces (n, k) K y."""
-        found = self._coupling.of(self._functions, readings)
+        found = self._coupling.of_flat(self._flat, readings)
         return found if self.passing is None else found + self.passing.damper_forces(readings)
 
     def solve(self, right: Complexes, start: Complexes | None) -> tuple[Complexes, int]:

@@ -19,7 +19,6 @@ n = h z + r of a gear with z teeth is its part r beside the cycle h of the mesh,
 
 from __future__ import annotations
 
-import cmath
 import itertools
 import math
 from collections.abc import Mapping
@@ -44,10 +43,11 @@ from exugear.steady.mean_system.standing_loads import reactions
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.system.kernels.meshes import FRAME
 from exugear.system.kernels.turning import travelling_tangent
-from exugear.system.kernels.varying_loads import VaryingLoadArrays, no_varying_loads, size_and_phase
+from exugear.system.kernels.varying_loads import VaryingLoadArrays, fill_sizes_and_phases, no_varying_loads
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
+from fe_ste.tools.bundles import cached_bundle
 
 NEGLECTED = 1e-2
 """Share of the root mean square of a mesh component's deviations in orders that are left out."""
@@ -118,11 +118,11 @@ class ShaftOrders:
 
     def reaction_at(self, speed: float, static: Floats) -> Complexes:
         """Find forces and reactions (t, size + 6 r) at a speed of the input (rad/s), static deflections (size,)."""
-        factors = np.ones(len(self.load), dtype=complex)
-        angles = self.loads.order * (self.angles @ static) if len(self.angles) else np.zeros(0)
-        for n in np.unique(self.load[self.load >= 0]).tolist():
-            size, phase = size_and_phase(n, speed * self.speeds[n], self.loads)
-            factors[self.load == n] = cmath.rect(size, phase + angles[n])
+        found = np.empty((len(self.speeds), 2))
+        fill_sizes_and_phases(speed * self.speeds, cached_bundle(self.loads), found)
+        # Deviations, whose number of a load is -1, have the factor behind those of all loads.
+        angles = found[:, 1] + self.loads.order * (self.angles @ static) if len(found) else found[:, 1]
+        factors = np.append(found[:, 0] * np.exp(1j * angles), 1.0)[self.load]
         return np.asarray(self.reaction * factors[:, None])
 
     def change_by_turning(self, sampling: TorusSampling, motion: Complexes, speed: float, static: Floats) -> Floats:
