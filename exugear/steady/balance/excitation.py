@@ -726,7 +726,7 @@ class HarmonicBalanceModel:
         speed = interface.speed
         system = self.system
         change = self.shaft_orders.change_by_turning(self.sampling, motion, speed, system.static_at(speed))
-        loads = self._shaft_loads(speed) + self.sampling.coefficients(change)
+        loads = self._shaft_loads(speed) + change
         pencil = system.stiffness_at(speed), system.damping_at(speed)
         other = self._with_friction(loads, speed)
         still = system.still(pencil[0], other[0].real[:, None])[:, 0]
