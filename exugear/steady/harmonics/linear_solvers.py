@@ -260,7 +260,7 @@ def solve_side_by_side(
     sizes = np.abs(own[loaded]).max(axis=1, initial=0.0)
     # Behind the loads of those lines that have some are none, for all others.
     alone = np.append(own[loaded] / sizes[:, None], np.zeros((1, len(order))), axis=0)
-    place = np.full(len(own), len(loaded))
+    place = np.full(len(own), len(loaded), dtype=np.int64)
     place[loaded] = np.arange(len(loaded))
     memory = aligned_zeros(2 * SIZE * max(len(plan.row), 2 * len(order))).reshape(2, -1)
     x = aligned_zeros(2 * SIZE * len(order) * (loads.shape[1] + 2))
