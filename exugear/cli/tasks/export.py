@@ -257,9 +257,8 @@ def _nearest(speeds: np.ndarray, speed: float) -> int:
 
 def _left_out(gearbox: Gearbox, mesh_model: str, numbers: Mapping[str, int]) -> Iterator[Finding]:
     """Say which loads on what stands still the files do not have."""
-    fixed = [body for body in gearbox.bodies() if body.fixed]
-    for body in fixed:
-        for gear in body.wheels:
+    for body in gearbox.bodies():
+        for gear in body.wheels if body.fixed else ():
             if gear not in numbers:
                 yield Finding(
                     "warning",
