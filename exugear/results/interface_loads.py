@@ -4,7 +4,7 @@ With them a structural department computes sound or stress by its own model of t
 
 - F(t) = Re(F exp(i omega t)): complex amplitudes are zero-to-peak, with the phase at angle zero of the overall input.
 - A positive force or moment acts on the housing, along or about the axes of the gearbox.
-- Moments are about the seat: the position of a bearing, or the middle of a gear on its axis.
+- Moments are about the seat: the position of a bearing, the middle of a gear on its axis, the place of an excitation.
 - Static loads are not included.
 """
 
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 OF_BEARINGS = ("support_force", "support_moment")
-OF_GEARS = ("gear_force", "gear_moment")
-"""Signals of force and moment: of bearings on their moving bodies, of gears on the fixed body itself."""
+ON_BODIES = (("gear_force", "gear_moment"), ("reaction_force", "reaction_moment"))
+"""Signals of force and moment: of bearings on their moving bodies, of gears and excitations on the fixed body."""
 AXES = ("x", "y", "z")
 DIRECTIONS = (*AXES, *(f"r{axis}" for axis in AXES))
 """Forces along the axes, then moments about them: components 1 to 6 of a node in Nastran."""
@@ -47,7 +47,7 @@ class InterfaceLoads:
     speed: float
     """Of the overall input, rad/s."""
     seats: tuple[str, ...]
-    """(s,) names of the bearings and gears."""
+    """(s,) names of the bearings, gears and excitations."""
     nodes: tuple[int, ...]
     """(s,) node numbers."""
     order: Floats
@@ -58,11 +58,17 @@ class InterfaceLoads:
 
 
 def loaded_seats(gearbox: Gearbox, data: xr.Dataset) -> tuple[str, ...]:
-    """Bearings on what stands still, then gears of fixed bodies, as far as a response has their loads."""
-    prefix = f"{OF_GEARS[0]} "
+    """Bearings on what stands still, then gears of fixed bodies and excitations that a response has the loads of."""
+    return (*(bearing.name for bearing in gearbox.standing_bearings), *(name for name, _ in _on_bodies(data)))
+
+
+def _on_bodies(data: xr.Dataset) -> Iterator[tuple[str, tuple[str, str]]]:
+    """Yield gears and excitations with their signals of force and moment."""
     names = [str(name) for name in data["signal"].to_numpy()]
-    gears = dict.fromkeys(name.removeprefix(prefix).rsplit(" ", 1)[0] for name in names if name.startswith(prefix))
-    return (*(bearing.name for bearing in gearbox.standing_bearings), *gears)
+    for signals in ON_BODIES:
+        prefix = f"{signals[0]} "
+        found = (name.removeprefix(prefix).rsplit(" ", 1)[0] for name in names if name.startswith(prefix))
+        yield from ((name, signals) for name in dict.fromkeys(found))
 
 
 def interface_loads(
@@ -82,11 +88,11 @@ def interface_loads(
         The response has no forces of these bearings: it belongs to another gearbox or variant.
     """
     names = [str(name) for name in data["signal"].to_numpy()]
-    seats = loaded_seats(gearbox, data)
     bearings = len(gearbox.standing_bearings)
+    signals_of = [*((own.name, OF_BEARINGS) for own in gearbox.standing_bearings), *_on_bodies(data)]
+    seats = tuple(seat for seat, _ in signals_of)
     columns = []
-    for place, seat in enumerate(seats):
-        signals = OF_BEARINGS if place < bearings else OF_GEARS
+    for seat, signals in signals_of:
         wanted = [f"{signal} {seat} {axis}" for signal in signals for axis in AXES]
         if not set(wanted) <= set(names):
             raise ValueError(f"no loads of the bearing {seat}; compute the response of this gearbox again")

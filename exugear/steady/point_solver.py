@@ -128,7 +128,7 @@ class ContactLossState:
         loads = old.interface.loads
         if loads is not None and model.shaft_orders.sidebands:
             own = at[0].ravel()
-            turned = replace(loads, loads=loads.loads[own], motion=loads.motion[own])
+            turned = replace(loads, loads=loads.loads[own], motion=loads.motion[own], reactions=loads.reactions[own])
             interface = replace(interface, loads=turned)
         response = replace(
             old,

@@ -30,6 +30,7 @@ from exugear.gearbox.versions import MODES, REDUCTION, RUN
 from exugear.system.bearings.duty import OperatingPoint
 from exugear.system.bearings.stiffness import law_in_words, load_stands_still
 from exugear.system.bodies.elastic_body import ElasticBody, FloatingBody
+from exugear.system.bodies.reduction import Seat
 from exugear.system.bodies.turning_frame import TurningBody, turning_arrays
 from exugear.system.kernels.connectors import (
     ConnectorArrays,
@@ -374,25 +375,31 @@ class Assembly(ReprMixin):
     ) -> tuple[Integers, Complexes]:
         """Coordinates (k,) and generalized forces (k,) of a force and moment (6,), N and N m, on a body at a place (m).
 
-        On a flexible body they act at the seat named after the force, or at its main seat. Coordinates that the body
-        does not have are left out.
+        On a flexible body they act at the seat of `loaded_seat`. Coordinates that the body does not have are left out.
         """
         where = self.coordinates.get(body, (-1,) * BODY_SIZE)
-        arm = np.zeros(3)
-        elastic = self.elastic_bodies.get(body)
-        if elastic is not None:
-            places = {seat.name: np.array(seat.position) for seat in elastic.reduced.seats}
-            seat = elastic.shared_seats.get(name, name)
-            if seat not in places:
-                seat = elastic.main_seat
-            where = self.coordinates[seat_key(body, seat)]
-            arm = arm if position is None else position - places[seat]
+        node = None
+        if (seat := self.loaded_seat(name, body)) is not None:
+            where = self.coordinates[seat_key(body, seat.name)]
+            node = np.array(seat.position)
         elif position is not None:
-            arm = position - node_position(next(own for own in self.gearbox.bodies(self.inertias) if own.name == body))
+            node = node_position(next(own for own in self.gearbox.bodies(self.inertias) if own.name == body))
+        arm = np.zeros(3) if position is None or node is None else position - node
         acting = np.append(wrench[:3], wrench[3:] + np.cross(arm, wrench[:3]))
         index = np.array(where, dtype=np.int64)
         moves = (index >= 0) & (acting != 0.0)
         return index[moves], acting[moves]
+
+    def loaded_seat(self, name: str, body: str) -> Seat | None:
+        """Seat at which a force or an excitation acts on a flexible body: that of its name, or the main seat.
+
+        None if the body is not flexible.
+        """
+        elastic = self.elastic_bodies.get(body)
+        if elastic is None:
+            return None
+        seats = {seat.name: seat for seat in elastic.reduced.seats}
+        return seats.get(elastic.shared_seats.get(name, name), seats[elastic.main_seat])
 
     def torque_vector(self, torques: Mapping[str, float]) -> Floats:
         """Generalized forces of torques about the bodies' spin axes (N m), shape (size,)."""

@@ -133,7 +133,8 @@ def export_loads(
         raise BadInputError(f"--loads {error}; specify a file that exugear steady has written") from error
     speeds = data["speed"].to_numpy()
     points = range(len(speeds)) if speed is None else [_nearest(speeds, speed)]
-    numbers = _numbers(gearbox, loaded_seats(gearbox, data))
+    is_flexible = choice_of(data.attrs).variant == Variant.flexible
+    numbers = _numbers(gearbox, loaded_seats(gearbox, data), is_flexible)
     try:
         loads = list(interface_loads(gearbox, data, points, numbers))
     except ValueError as error:
@@ -256,9 +257,8 @@ def _nearest(speeds: np.ndarray, speed: float) -> int:
 
 def _left_out(gearbox: Gearbox, mesh_model: str, numbers: Mapping[str, int]) -> Iterator[Finding]:
     """Say which loads on what stands still the files do not have."""
-    fixed = [body for body in gearbox.bodies() if body.fixed]
-    for body in fixed:
-        for gear in body.wheels:
+    for body in gearbox.bodies():
+        for gear in body.wheels if body.fixed else ():
             if gear not in numbers:
                 yield Finding(
                     "warning",
@@ -271,23 +271,22 @@ def _left_out(gearbox: Gearbox, mesh_model: str, numbers: Mapping[str, int]) -> 
                     f"loads on {gear} are those along the line of action; moments by uneven load along the face are "
                     f"not included with the mesh model {mesh_model}",
                 )
-            if gearbox.case.damping.tooth_friction:
-                yield Finding("note", f"friction of the teeth is not included in the loads on {gear}")
-    for name in dict.fromkeys(
-        own.excitation for own in gearbox.varying_loads if own.reaction_on in {body.name for body in fixed}
-    ):
-        yield Finding("warning", f"the reaction of excitations.{name} is not included; apply it separately")
 
 
-def _numbers(gearbox: Gearbox, seats: Sequence[str]) -> dict[str, int]:
-    """Node number of each seat: that on a flexible housing; others are counted from there, or from 1."""
+def _numbers(gearbox: Gearbox, seats: Sequence[str], is_flexible: bool) -> dict[str, int]:
+    """Node number of each seat: that on a flexible housing; others are counted from there, or from 1.
+
+    Excitations have the node of their seat only if the response is flexible: else they are at another place.
+    """
     numbers: dict[str, int] = {}
     on = {bearing.name: bearing.on for bearing in gearbox.standing_bearings}
     for body in gearbox.bodies():
         section = gearbox.case.bodies[body.family]
         if body.fixed and (section.external is not None or section.solid is not None):
             at_seats = node_numbers(gearbox, body.name)
-            own = (seat for seat in seats if seat in body.wheels or on.get(seat) == body.name)
+            reacting = [load.excitation for load in gearbox.varying_loads if load.reaction_on == body.name]
+            here = {*body.wheels, *(reacting if is_flexible else ())}
+            own = (seat for seat in seats if seat in here or on.get(seat) == body.name)
             numbers |= {seat: at_seats[seat] for seat in own if seat in at_seats}
     others = (seat for seat in seats if seat not in numbers)
     return numbers | {seat: number for number, seat in enumerate(others, start=max(numbers.values(), default=0) + 1)}

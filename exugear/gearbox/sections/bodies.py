@@ -228,6 +228,8 @@ class ExternalSection(DampedBodySection):
     """File with the gyroscopic matrix of a shaft per rad/s about +z of the gearbox, antisymmetric, both triangles."""
     recovery: FileName | None = None
     """File (.npz) with the outer surface of a fixed body and its motion by the coordinates, for its sound power."""
+    recovery_matrix: FileName | None = None
+    """File (.op4) with the recovery matrix MUG1 of the points of this surface, if it has no `displacement`."""
     band_Hz: q.FrequencyHz | None = None
     """Cut-off frequency of the modal coordinates, for the sound power; `elasticity.band_Hz` by default."""
     nodes: FileName | None = None
@@ -261,6 +263,8 @@ class ExternalSection(DampedBodySection):
             raise ValueError("set either file, or stiffness and mass")
         if self.file is None and not all(apart):
             raise ValueError("requires its matrices; set file, or stiffness and mass")
+        if self.recovery_matrix is not None and self.recovery is None:
+            raise ValueError("recovery_matrix requires points, normals and areas of the surface; set recovery")
         return self
 
 

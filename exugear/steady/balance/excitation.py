@@ -10,7 +10,9 @@ from functools import cached_property
 import numpy as np
 
 from exugear.results.sound.radiated_power import RadiatedPower, radiated_power
+from exugear.steady.balance.acting_forces import acting_forces
 from exugear.steady.balance.interface import Interface, LoadResponse
+from exugear.steady.harmonics.linear_solvers import Batches, batches_of
 from exugear.steady.harmonics.lines import (
     Group,
     HarmonicCoupling,
@@ -63,8 +65,9 @@ from exugear.steady.mean_system.signals import (
     quantities_of,
     signal_rows,
 )
-from exugear.steady.mean_system.standing_loads import gear_load_rows, moment_supports
-from exugear.steady.mean_system.tooth_friction import tooth_friction
+from exugear.steady.mean_system.standing_loads import gear_load_rows, moment_supports, reacting_excitations
+from exugear.steady.mean_system.tooth_friction import friction_parts, tooth_friction
+from exugear.system.kernels.coordinates import BODY_SIZE
 from exugear.system.kernels.meshes import SPIN_1
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
@@ -231,8 +234,13 @@ class HarmonicBalanceModel:
         return bearings, np.asarray(first + len(AXES) * places[:, None] + np.arange(2))
 
     @cached_property
-    def gear_load_rows(self) -> tuple[Floats, Floats]:
-        """Loads of the gears that stand still per unit of each wave's force and moment, (m, 6 gears) each."""
+    def reacting_excitations(self) -> tuple[str, ...]:
+        """Excitations with reactions on fixed bodies; r of them."""
+        return reacting_excitations(self.waves.assembly.gearbox)
+
+    @cached_property
+    def gear_load_rows(self) -> tuple[Floats, Floats, Floats]:
+        """Loads of the gears that stand still per unit of what acts on each wave, as `gear_load_rows` has them."""
         return gear_load_rows(self.waves)
 
     @cached_property
@@ -616,19 +624,16 @@ class HarmonicBalanceModel:
         ports = self.ports_at(speed)
         frequencies = abs(speed) * self.lines.orders
         loads = self.loads(ports)
-        # Laws with fewer forces than others have none in their places.
-        acting = np.flatnonzero(loads.any(axis=0))
         pencil = system.stiffness_at(speed), system.damping_at(speed)
-        found = system.still(pencil[0], loads[:, acting])
-        moved = np.empty((len(frequencies), system.size, len(acting)), dtype=complex)
-        moved[0] = found[:-1]
-        system.fill_responses(pencil, frequencies[1:], loads[:, acting], moved[1:])
-        still = found[-1]
-        motion = moved
-        if len(acting) < loads.shape[1]:
-            still = np.zeros(loads.shape[1])
-            motion = np.zeros((len(frequencies), *loads.shape), dtype=complex)
-            still[acting], motion[:, :, acting] = found[-1], moved
+        stated = self._shaft_loads(speed)
+        other = self._with_friction(stated, speed)
+        still = system.still(pencil[0], np.column_stack([loads, other[0].real]))
+        motion = np.zeros((len(frequencies), *loads.shape), dtype=complex)
+        motion[0] = still[:-1, :-1]
+        answer = other.copy()
+        answer[0] = still[:-1, -1]
+        system.fill_responses(pencil, frequencies[1:], loads, answer[1:], self._batches, motion[1:])
+        has_loads = bool(self._friction.size or self.shaft_orders.sidebands)
         shape = ports.forces.shape[:2]
         rows = {name: system.at(values, speed) for name, values in self._rows.items()}
         return Interface(
@@ -638,10 +643,23 @@ class HarmonicBalanceModel:
             ports=ports,
             rows=SignalRows(self._row_names, **rows),
             torque=system.torque_at(speed),
-            torque_per_force=still.reshape(shape),
+            torque_per_force=still[-1, :-1].reshape(shape),
             bearings=self._bearings_at(speed),
-            loads=self._load_response_at(speed, pencil, frequencies),
+            loads=LoadResponse(other, answer, float(still[-1, -1]), stated[:, system.size :]) if has_loads else None,
         )
+
+    @cached_property
+    def _batches(self) -> Batches:
+        """Lines but the mean with the forces that may act there: all of them, or those of `acting_forces`."""
+        moving = self._ports["forces"].any(axis=(0, -1)).ravel()  # laws with fewer forces have none in their places
+        acting = np.ones((len(self.lines.index), len(moving)), dtype=bool)
+        if moving.size and not self.is_nonlinear and self.ring is None:
+            acting = acting_forces(self.coupling, self.slow_shifts[1], self._displacements)
+        stated = np.full(len(acting), bool(self._friction.size))
+        if self.shaft_orders.sidebands:
+            places = self._shaft_places.line[self.shaft_orders.reaction.any(axis=1)]
+            stated[places[places >= 0]] = True
+        return batches_of((acting & moving)[1:], stated[1:])
 
     @cached_property
     def _friction(self) -> Complexes:
@@ -652,15 +670,34 @@ class HarmonicBalanceModel:
         return np.array([tooth_friction(self.waves, self.lines, self.ports_at(s), s, self.harmonics) for s in speeds])
 
     @cached_property
+    def _friction_on_gears(self) -> Complexes:
+        """Loads (3, n, 6 gears) on gears that stand still by the friction of teeth at the three speeds."""
+        rows = self.gear_load_rows[-1]
+        speeds = map(float, self.system.speeds)
+        parts = [friction_parts(self.waves, self.lines, self.ports_at(s), s, self.harmonics) for s in speeds]
+        return np.array([np.tensordot(own, rows, axes=2) for own in parts])
+
+    def friction_on_gears(self, speed: float) -> Complexes | float:
+        """Find loads (n, 6 gears) of the friction of teeth on standing gears at a speed (rad/s); 0 without any."""
+        if not (self._friction.size and self.gear_load_rows[-1].size):
+            return 0.0
+        return np.asarray(self.system.at(self._friction_on_gears, speed))
+
+    @cached_property
     def _shaft_places(self) -> Places:
         """Places of the terms of the orders of shafts among the lines."""
         return self.shaft_orders.places(self.lines)
 
     def shaft_loads(self, speed: float, source: str | None = None) -> Complexes:
         """Generalized forces (n, size) of deviations and stated loads at the lines, or those of one excitation."""
+        return self._shaft_loads(speed, source)[:, : self.system.size]
+
+    def _shaft_loads(self, speed: float, source: str | None = None) -> Complexes:
+        """Return the same with the reactions on fixed bodies behind them (n, size + 6 r)."""
         orders = self.shaft_orders
         if not orders.sidebands:
-            return np.zeros((len(self.lines.index), self.system.size), dtype=complex)
+            size = self.system.size + BODY_SIZE * len(self.reacting_excitations)
+            return np.zeros((len(self.lines.index), size), dtype=complex)
         counted = np.array([source in (None, name) for name in orders.source])
         reaction = orders.reaction_at(speed, self.system.static_at(speed)) * counted[:, None]
         return at_lines(reaction, self._shaft_places, len(self.lines.index), speed)
@@ -677,40 +714,30 @@ class HarmonicBalanceModel:
         """Deviations (n, m) of gears in the meshes at the lines, at a speed of the input (rad/s), m."""
         return self._displacements if speed > 0.0 else self._displacements.conj()
 
-    def _load_response_at(
-        self, speed: float, pencil: tuple[Floats, Floats], frequencies: Floats
-    ) -> LoadResponse | None:
-        """Solve for the response to these loads at a speed of the input, rad/s; None without any."""
-        if not (self._friction.size or self.shaft_orders.sidebands):
-            return None
-        loads = self.shaft_loads(speed)
+    def _with_friction(self, stated: Complexes, speed: float) -> Complexes:
+        """Generalized forces (n, size) of friction and of loads with reactions (n, size + 6 r) at a speed, rad/s."""
+        loads = stated[:, : self.system.size].copy()
         if self._friction.size:
             loads += self.system.at(self._friction, speed)
-        return self._response_to(loads, pencil, frequencies)
-
-    def _response_to(self, loads: Complexes, pencil: tuple[Floats, Floats], frequencies: Floats) -> LoadResponse:
-        """Solve for the response to loads (n, size) in the rotating frame, with stiffness and damping at a speed."""
-        system = self.system
-        motion = np.zeros(loads.shape, dtype=complex)
-        still = system.still(pencil[0], loads[0].real[:, None])[:, 0]
-        motion[0] = still[:-1]
-        acting = np.flatnonzero(loads[1:].any(axis=1)) + 1
-        w = frequencies[acting, None, None]
-        motion[acting] = np.linalg.solve(pencil[0] - w**2 * system.mass + 1j * w * pencil[1], loads[acting, :, None])[
-            ..., 0
-        ]
-        return LoadResponse(loads, motion, float(still[-1]))
+        return loads
 
     def with_turned_loads(self, interface: Interface, motion: Complexes) -> Interface:
         """Return the interface with stated loads at the angles to which a motion (n, size) turns their bodies."""
         speed = interface.speed
         system = self.system
         change = self.shaft_orders.change_by_turning(self.sampling, motion, speed, system.static_at(speed))
-        loads = self.shaft_loads(speed) + self.sampling.coefficients(change)
-        if self._friction.size:
-            loads += system.at(self._friction, speed)
+        loads = self._shaft_loads(speed) + change
         pencil = system.stiffness_at(speed), system.damping_at(speed)
-        return replace(interface, loads=self._response_to(loads, pencil, interface.frequencies))
+        other = self._with_friction(loads, speed)
+        still = system.still(pencil[0], other[0].real[:, None])[:, 0]
+        answer = other.copy()
+        answer[0] = still[:-1]
+        none = np.zeros((system.size, 0))
+        batches = batches_of(np.zeros((len(other) - 1, 0), dtype=bool), np.asarray(other[1:].any(axis=1)))
+        no_motion = np.zeros((len(other) - 1, *none.shape), dtype=complex)
+        system.fill_responses(pencil, interface.frequencies[1:], none, answer[1:], batches, no_motion)
+        response = LoadResponse(other, answer, float(still[-1]), loads[:, system.size :])
+        return replace(interface, loads=response)
 
     def _bearings_at(self, speed: float) -> BearingMean | None:
         """Nonlinear bearings in the averaged system at a speed of the input, rad/s; None without any."""

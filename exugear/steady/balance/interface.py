@@ -26,6 +26,8 @@ class LoadResponse:
     """(n, size) motion under them."""
     torque: float
     """Mean torque of the drive that overcomes them, N m."""
+    reactions: Complexes
+    """(n, 6 r) reactions of stated loads on fixed bodies, N and N m."""
     at_mean_angles: bool = False
     """Whether stated loads are at the angles of the mean speed because they did not settle at those that the vibration
     gives their bodies."""
@@ -73,9 +75,12 @@ class Interface:
 
     @cached_property
     def deflection_per_force(self) -> Complexes:
-        """What laws along a row read along what they push along, (n, m f, m f), under a unit of each force."""
+        """What laws along a row read along what they push along, (n, m f, m f), under a unit of each force.
+
+        They do not read rates.
+        """
         lines, waves, forces = self.motion.shape[0], *self.motion.shape[2:]
-        read = self.readings[:, :waves, :forces]
+        read = _taken(self.ports.readings[:, :forces], self.motion)
         return np.ascontiguousarray(read).reshape(lines, waves * forces, waves * forces)
 
     @cached_property

@@ -27,6 +27,7 @@ from exugear.steady.harmonics.linear_solvers import solve_lines
 from exugear.steady.harmonics.lines import add_answered, flat
 from exugear.steady.mean_system.bearing_waves import TILTS
 from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, POSITION, CycleFunctions, MeshInterface
+from exugear.system.kernels.coordinates import BODY_SIZE
 from exugear.system.kernels.meshes import TILT_DAMPING, TILT_STIFFNESS
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.bundles import cached_bundle
@@ -153,7 +154,7 @@ class MovingPositions:
         self._model = model
         self._interface = interface
         self._shape = len(model.lines.index), *ports.forces.shape[:2]
-        self._slopes = model.slopes_over_cycle.at(ports, interface.speed)
+        self._slopes = flat(model.slopes_over_cycle.at(ports, interface.speed))
         waves = model.waves.waves
         self._lines, self._coupling = model.slow_shifts
         self._rows = np.ascontiguousarray(ports.readings[: self._shape[1], POSITION].T)
@@ -184,7 +185,7 @@ class MovingPositions:
             return found
         along = np.zeros(self._shape, dtype=complex)
         along[..., DEFLECTION] = deflections - model.deviations(interface.speed)
-        changes = model.coupling.of(self._slopes, along.reshape(len(along), -1)).reshape(self._shape) + self._pulls
+        changes = model.coupling.of_flat(self._slopes, along.reshape(len(along), -1)).reshape(self._shape) + self._pulls
         shifts = np.concatenate([positions, positions.conj()])
         products = np.zeros((len(shifts), self._shape[1], self._shape[1]), dtype=complex)
         for n, at in enumerate(self._mean):
@@ -239,10 +240,13 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
     for again in reversed(range(1 + (POSITIONS_REPEATED if repeated else 0))):
         whole = (given + moved).reshape(shape[0], -1)
         start = still - (answers @ whole[..., None])[..., 0]
-        found, more = balance.solve(start, found)
+        before = found
+        found, more = balance.solve(start, before)
         products += more
         excess = whole + balance.forces(found)
         deflection = (found / lengths).reshape(shape)[..., DEFLECTION]
+        if before is not None and model.ring is None and _is_settled(found, before):
+            break
         if again and positions is not None:
             moved = positions.forces(deflection, excess)
         if again and model.ring is not None:
@@ -251,6 +255,16 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
             balance = LineBalance(model, shifted, answers, passing)
             given = given_forces(model, shifted) + deviation_forces(model, shifted, passing)
     return _response(model, interface, deflection, excess.reshape(shape), products)
+
+
+def _is_settled(found: Complexes, before: Complexes) -> bool:
+    """Return whether positions that move with a solution would change it by less than the residual.
+
+    Their forces are products of deflections and positions: a relative change c of both changes them by 2 c, and these
+    forces have themselves changed the solution by c.
+    """
+    change = float(np.linalg.norm(found - before) / np.linalg.norm(found))
+    return 2.0 * change**2 < TOLERANCE
 
 
 class LineBalance:
@@ -277,7 +291,8 @@ class LineBalance:
             for function, group in zip(functions, self._coupling.groups, strict=True)
         ]
         self._answers = answers
-        self._parts = *flat(self._functions), *flat([answers])
+        self._flat = flat(self._functions)
+        self._parts = *self._flat, *flat([answers])
         self._memory = self._coupling.memory()
         self._octets = np.empty(2 * SIZE)
         self.passing = passing
@@ -295,7 +310,7 @@ class LineBalance:
 
     def forces(self, readings: Complexes) -> Complexes:
         """Return the forces (n, k) K y."""
-        found = self._coupling.of(self._functions, readings)
+        found = self._coupling.of_flat(self._flat, readings)
         return found if self.passing is None else found + self.passing.damper_forces(readings)
 
     def solve(self, right: Complexes, start: Complexes | None) -> tuple[Complexes, int]:
@@ -377,6 +392,9 @@ def signals(model: HarmonicBalanceModel, response: Response) -> Complexes:
     if model.shaft_orders.sidebands:
         deflection = deflection - model.deviations(interface.speed)
     found = [of_motion, deflection, response.force[:, model.waves.force_waves], _gear_loads(model, response)]
+    if model.reacting_excitations:
+        none = np.zeros((len(of_motion), BODY_SIZE * len(model.reacting_excitations)), dtype=complex)
+        found.append(none if interface.loads is None else interface.loads.reactions)
     if model.radiated is not None:
         # A line of a coefficient c oscillates with the amplitude 2 c.
         velocity = model.radiated.surface_velocity(2.0 * response.motion, interface.frequencies)
@@ -385,12 +403,12 @@ def signals(model: HarmonicBalanceModel, response: Response) -> Complexes:
 
 
 def _gear_loads(model: HarmonicBalanceModel, response: Response) -> Complexes:
-    """Find the forces and moments (n, 6 gears) of the meshes on gears that stand still.
+    """Find the forces and moments (n, 6 gears) of the meshes and their friction on gears that stand still.
 
     Of the model `table` only the forces along the line of action are included.
     """
-    by_force, by_moment = model.gear_load_rows
-    found = response.force @ by_force
+    by_force, by_moment, _ = model.gear_load_rows
+    found = response.force @ by_force + model.friction_on_gears(response.interface.speed)
     waves = model.waves
     tilt = waves.assembly.meshes.tilt[[wave.first for wave in waves.waves]]
     if by_moment.any() and tilt[:, TILT_STIFFNESS].any():

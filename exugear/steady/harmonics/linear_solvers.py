@@ -200,100 +200,222 @@ def elimination(pattern: Booleans) -> Elimination:
     )
 
 
+class Batches(NamedTuple):
+    """Order in which n lines are solved, eight at a time, each eight with the loads that act on any of them."""
+
+    lines: Integers
+    """(n,) lines."""
+    first: Integers
+    """(o + 1,) first of the loads of each eight in the array that follows."""
+    columns: Integers
+    """(c,) loads."""
+    own: Integers
+    """(o,) 1 where the lines have loads of their own as well, else 0."""
+
+
+def batches_of(acting: Booleans, own: Booleans) -> Batches:
+    """Put lines next to each other on which the same loads act (n, loads), and that have loads of their own (n,).
+
+    Examples
+    --------
+    >>> found = batches_of(np.arange(9)[:, None] == [0, 3], np.zeros(9, dtype=bool))
+    >>> found.lines.tolist(), found.columns.tolist(), found.first.tolist()
+    ([1, 2, 4, 5, 6, 7, 8, 0, 3], [0, 1], [0, 1, 2])
+    """
+    keys = np.column_stack([acting, own])
+    lines = np.lexsort(keys.T[::-1])
+    unions = [np.asarray(keys[lines[start : start + SIZE]].any(axis=0)) for start in range(0, len(lines), SIZE)]
+    columns = [np.flatnonzero(union[:-1]) for union in unions]
+    return Batches(
+        lines=lines.astype(np.int64),
+        first=np.cumsum([0, *map(len, columns)]).astype(np.int64),
+        columns=np.concatenate([np.zeros(0, dtype=np.int64), *columns]),
+        own=np.array([union[-1] for union in unions], dtype=np.int64),
+    )
+
+
 def solve_side_by_side(
     plan: Elimination,
-    stiffness: Floats,
-    damping: Floats,
-    mass: Floats,
+    pencil: tuple[Floats, Floats, Floats],
     frequencies: Floats,
     loads: Floats,
+    own: Complexes,
+    batches: Batches,
     amplitudes: Complexes,
 ) -> None:
-    """Fill amplitudes x (lines, n, loads) of (K + i w C - w^2 M) x = f, an array in C order.
+    """Fill amplitudes x (lines, n, loads) of (K + i w C - w^2 M) x = f, an array in C order, where loads act.
 
     Parameters
     ----------
     plan : of a pattern that holds all entries of the three matrices
-    stiffness, damping, mass : (n, n)
+    pencil : stiffness, damping and mass (n, n)
     frequencies : (lines,) angular frequencies w, rad/s
     loads : (n, loads)
+    own : (lines, n) loads of each line by itself, which are replaced by their amplitudes
     """
+    stiffness, damping, mass = pencil
     places = (plan.row, plan.column)
-    given = np.ascontiguousarray(loads[plan.order])
-    memory = aligned_zeros(2 * SIZE * max(len(plan.row), 2 * len(plan.order))).reshape(2, -1)
-    x = aligned_zeros(2 * SIZE * loads.size)
-    numbers = amplitudes.view(np.float64)
-    pencil = (stiffness[places], damping[places], mass[places])
-    missing = np.empty(len(frequencies))
-    solve_octets(cached_bundle(plan), *pencil, frequencies, given, memory[0], memory[1], x, numbers, missing)
-    scale = np.abs(loads.sum(axis=1)).max() + 1e-3 * np.abs(loads).max()
+    order = plan.order
+    loaded = np.flatnonzero(own.any(axis=1))
+    sizes = np.abs(own[loaded]).max(axis=1, initial=0.0)
+    # Behind the loads of those lines that have some are none, for all others.
+    alone = np.append(own[loaded] / sizes[:, None], np.zeros((1, len(order))), axis=0)
+    place = np.full(len(own), len(loaded), dtype=np.int64)
+    place[loaded] = np.arange(len(loaded))
+    memory = aligned_zeros(2 * SIZE * max(len(plan.row), 2 * len(order))).reshape(2, -1)
+    x = aligned_zeros(2 * SIZE * len(order) * (loads.shape[1] + 2))
+    of_loads = np.ascontiguousarray(loads[order]), np.ascontiguousarray(alone[:, order]).view(np.float64)
+    missing = np.zeros(len(frequencies))
+    entries = (stiffness[places], damping[places], mass[places])
+    found = np.empty_like(alone)
+    solve_octets(
+        cached_bundle(plan),
+        cached_bundle(batches),
+        *entries,
+        frequencies,
+        *of_loads,
+        place,
+        memory[0],
+        memory[1],
+        x,
+        amplitudes.view(np.float64),
+        found.view(np.float64),
+        missing,
+    )
     # A residual that is no number is none that is small.
-    for line in np.flatnonzero(~(missing <= LEFT_OVER * scale)):
+    for line in np.flatnonzero(~(missing <= LEFT_OVER)):
         w = frequencies[line]
-        amplitudes[line] = np.linalg.solve(stiffness - w**2 * mass + 1j * w * damping, loads)
+        matrix = stiffness - w**2 * mass + 1j * w * damping
+        amplitudes[line], found[place[line]] = (
+            np.linalg.solve(matrix, loads),
+            np.linalg.solve(matrix, alone[place[line]]),
+        )
+    own[loaded] = found[:-1] * sizes[:, None]
 
 
 @kernel
 def solve_octets(
     plan: Elimination,
+    batches: Batches,
     stiffness: Floats,
     damping: Floats,
     mass: Floats,
     frequencies: Floats,
     loads: Floats,
+    own: Floats,
+    place: Integers,
     real: Floats,
     imaginary: Floats,
     x: Floats,
     out: Floats,
+    out_own: Floats,
     missing: Floats,
 ) -> None:
-    """Fill amplitudes (lines, n, 2 cases), real and imaginary parts in turns, and residuals (lines,), eight at a time.
+    """Fill amplitudes (lines, n, 2 cases), those of own loads (rows, 2 n), and residuals over loads (lines,).
 
-    Matrices are given by their entries (e,), loads (n, cases) by row in the order of the elimination. `real` and
-    `imaginary` (8 e, or 16 n if that is more) and `x` (16 n cases,) are memory.
+    Real and imaginary parts are in turns. Matrices are given by their entries (e,), loads (n, cases) and own loads
+    (rows, 2 n) in the order of the elimination; `place` (lines,) is the row of each line. `real` and `imaginary` (8 e,
+    or 16 n if that is more) and `x` (16 n (cases + 2),) are memory.
     """
-    size, cases = loads.shape
-    lines = frequencies.size
-    for line in range(0, lines, SIZE):
-        count = min(SIZE, lines - line)
-        for lane in range(SIZE):
-            x[lane] = frequencies[line + min(lane, count - 1)]  # the last line fills what is left
-        w = eight(x, 0)
+    size = plan.order.size
+    lines = batches.lines.size
+    for octet in range(batches.own.size):
+        begin = SIZE * octet
+        count = min(SIZE, lines - begin)
+        first = batches.first[octet]
+        shared = batches.first[octet + 1] - first
+        cases = shared + batches.own[octet]
+        if cases == 0:
+            continue
+        w = frequencies_of(begin, count, batches.lines, frequencies, x)
         for entry in range(stiffness.size):
             put(real, SIZE * entry, stiffness[entry] - w * w * mass[entry])
             put(imaginary, SIZE * entry, w * damping[entry])
-        eliminate(plan, loads, real, imaginary, x)
-        for k in range(size):
-            for case in range(cases):
-                at = 2 * SIZE * (k * cases + case)
-                for lane in range(count):
-                    out[line + lane, plan.order[k], 2 * case] = x[at + lane]
-                    out[line + lane, plan.order[k], 2 * case + 1] = x[at + SIZE + lane]
-        add_cases(plan.order, loads, real, imaginary, x)
-        for lane in range(SIZE):
-            x[lane] = frequencies[line + min(lane, count - 1)]
+        put_loads(begin, count, octet, batches, loads, own, place, x)
+        eliminate(plan, cases, real, imaginary, x)
+        for lane in range(count):
+            line = batches.lines[begin + lane]
+            for k in range(size):
+                row = plan.order[k]
+                at = 2 * SIZE * k * cases + lane
+                for case in range(shared):
+                    column = 2 * batches.columns[first + case]
+                    out[line, row, column] = x[at]
+                    out[line, row, column + 1] = x[at + SIZE]
+                    at += 2 * SIZE
+                if shared < cases:
+                    out_own[place[line], 2 * row] = x[at]
+                    out_own[place[line], 2 * row + 1] = x[at + SIZE]
+        scale = add_cases(plan.order, cases, real, imaginary, x)
+        frequencies_of(begin, count, batches.lines, frequencies, x)
         leave_over(plan, stiffness, damping, mass, real, imaginary, x)
         for lane in range(count):
-            missing[line + lane] = math.sqrt(x[lane])
+            missing[batches.lines[begin + lane]] = math.sqrt(x[lane]) / scale
 
 
 @kernel
-def add_cases(order: Integers, loads: Floats, real: Floats, imaginary: Floats, x: Floats) -> None:
-    """Put the sum of the solutions of all cases into the first 8 n numbers of the memory, by row, its loads behind."""
-    size, cases = loads.shape
+def frequencies_of(begin: int, count: int, lines: Integers, frequencies: Floats, x: Floats) -> Floats:
+    """Return frequencies of eight lines, of which `count` exist; they are the first numbers of the memory, too."""
+    for lane in range(SIZE):
+        x[lane] = frequencies[lines[begin + min(lane, count - 1)]]  # the last line fills what is left
+    return eight(x, 0)
+
+
+@kernel
+def put_loads(
+    begin: int, count: int, octet: int, batches: Batches, loads: Floats, own: Floats, place: Integers, x: Floats
+) -> None:
+    """Put the loads of eight lines into the memory, case by case of each row; their sums follow all of them."""
+    first = batches.first[octet]
+    shared = batches.first[octet + 1] - first
+    cases = shared + batches.own[octet]
+    size = loads.shape[0]
+    for k in range(size):
+        total = 0.0
+        for case in range(shared):
+            at = 2 * SIZE * (k * cases + case)
+            value = loads[k, batches.columns[first + case]]
+            total += value
+            put(x, at, all_eight(value))
+            put(x, at + SIZE, all_eight(0.0))
+        to = 2 * SIZE * (size * cases + k)
+        put(x, to, all_eight(total))
+        put(x, to + SIZE, all_eight(0.0))
+        if shared < cases:
+            at = 2 * SIZE * (k * cases + shared)
+            for lane in range(SIZE):
+                row = place[batches.lines[begin + min(lane, count - 1)]]
+                x[at + lane] = own[row, 2 * k]
+                x[at + SIZE + lane] = own[row, 2 * k + 1]
+                x[to + lane] += own[row, 2 * k]
+                x[to + SIZE + lane] += own[row, 2 * k + 1]
+
+
+@kernel
+def add_cases(order: Integers, cases: int, real: Floats, imaginary: Floats, x: Floats) -> float:
+    """Put the sum of the solutions of all cases into the first 8 n numbers of the memory, by row, its loads behind.
+
+    Returns
+    -------
+    largest load of any line and row
+    """
+    size = order.size
+    scale = 0.0
     for k in range(size):
         a = all_eight(0.0)
         b = all_eight(0.0)
-        given = 0.0
         for case in range(cases):
             at = 2 * SIZE * (k * cases + case)
             a = a + eight(x, at)
             b = b + eight(x, at + SIZE)
-            given += loads[k, case]
         put(real, SIZE * order[k], a)
         put(imaginary, SIZE * order[k], b)
-        put(real, SIZE * (size + order[k]), all_eight(-given))
-        put(imaginary, SIZE * (size + order[k]), all_eight(0.0))
+        at = 2 * SIZE * (size * cases + k)
+        for lane in range(SIZE):
+            scale = max(scale, abs(x[at + lane]), abs(x[at + SIZE + lane]))
+        put(real, SIZE * (size + order[k]), -1.0 * eight(x, at))
+        put(imaginary, SIZE * (size + order[k]), -1.0 * eight(x, at + SIZE))
+    return max(scale, 1e-300)
 
 
 @kernel
@@ -321,14 +443,9 @@ def leave_over(
 
 
 @kernel
-def eliminate(plan: Elimination, loads: Floats, real: Floats, imaginary: Floats, x: Floats) -> None:
-    """Solve eight systems, whose entries (8 e,) are overwritten, for loads (n, cases) that they share."""
-    size, cases = loads.shape
-    for k in range(size):
-        for case in range(cases):
-            at = 2 * SIZE * (k * cases + case)
-            put(x, at, all_eight(loads[k, case]))
-            put(x, at + SIZE, all_eight(0.0))
+def eliminate(plan: Elimination, cases: int, real: Floats, imaginary: Floats, x: Floats) -> None:
+    """Solve eight systems, whose entries (8 e,) are overwritten, for a number of loads, which become the solutions."""
+    size = plan.order.size
     for k in range(size):
         eliminate_row(k, cases, plan, real, imaginary, x)
         invert(SIZE * plan.diagonal[k], real, imaginary)

@@ -616,16 +616,22 @@ class HarmonicCoupling:
             By group: coefficients at its harmonics, rows what signals take in and columns what they give.
         values : (n, k)
         """
+        return self.of_flat(flat(functions), values)
+
+    def of_flat(self, functions: tuple[Floats, Floats], values: Complexes) -> Complexes:
+        """Products as in `of`, with functions as `flat` has them."""
         real, imaginary = self.memory()
-        take_in(cached_bundle(self.terms), *flat(functions), np.ascontiguousarray(values, complex), real, imaginary)
-        whole = (real + 1j * imaginary).reshape(len(values), -1)
-        ends = np.cumsum(self.terms.room)
-        return np.hstack(
-            [
-                whole[:, end - _filled(group.size) :][:, : group.size]
-                for group, end in zip(self.groups, ends, strict=True)
-            ]
-        )
+        take_in(cached_bundle(self.terms), *functions, np.ascontiguousarray(values, complex), real, imaginary)
+        found = np.empty((len(values), len(self._columns)), dtype=complex)
+        found.real = real.reshape(len(values), -1)[:, self._columns]
+        found.imag = imaginary.reshape(len(values), -1)[:, self._columns]
+        return found
+
+    @cached_property
+    def _columns(self) -> Integers:
+        """Signals (k,) among products, whose groups fill whole octets."""
+        starts = np.cumsum(self.terms.room) - self.terms.room
+        return np.concatenate([start + np.arange(group.size) for start, group in zip(starts, self.groups, strict=True)])
 
 
 def _filled(size: int) -> int:

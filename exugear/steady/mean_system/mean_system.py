@@ -19,7 +19,7 @@ import scipy.linalg
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Mesh
-from exugear.steady.harmonics.linear_solvers import Elimination, elimination, solve_side_by_side
+from exugear.steady.harmonics.linear_solvers import Batches, Elimination, elimination, solve_side_by_side
 from exugear.steady.mean_system.planet_sets import PlanetSet, SteadyError, phases_ahead, planet_sets
 from exugear.steady.mean_system.rotating_frame import RotatingFrame
 from exugear.steady.mean_system.symmetric_carriers import SymmetricCarrier, symmetric_carrier
@@ -147,19 +147,21 @@ class MeanSystem(ReprMixin):
         """How dynamic stiffnesses are eliminated: bodies touch each other at few coordinates."""
         return elimination((self.mass != 0.0) | (self.damping != 0.0).any(axis=0) | (self.stiffness != 0.0).any(axis=0))
 
-    def responses(self, speed: float, frequencies: Floats, loads: Floats) -> Complexes:
-        """Amplitudes (lines, size, n) at a speed of the input (rad/s), as `fill_responses` has them."""
-        found = np.empty((len(frequencies), *loads.shape), dtype=np.complex128)
-        self.fill_responses((self.stiffness_at(speed), self.damping_at(speed)), frequencies, loads, found)
-        return found
-
-    def fill_responses(self, pencil: tuple[Floats, Floats], frequencies: Floats, loads: Floats, out: Complexes) -> None:
+    def fill_responses(
+        self,
+        pencil: tuple[Floats, Floats],
+        frequencies: Floats,
+        loads: Floats,
+        own: Complexes,
+        batches: Batches,
+        out: Complexes,
+    ) -> None:
         """Fill amplitudes (lines, size, n) under unit loads (size, n) at angular frequencies (lines,), not zero.
 
-        The pencil is stiffness and damping at a speed.
+        The pencil is stiffness and damping at a speed. Loads of each line by itself (lines, size) become the amplitudes
+        under them. Unit loads that do not act on a line have no amplitudes there.
         """
-        if loads.shape[1]:  # a train without meshes has no unit loads
-            solve_side_by_side(self._plan, *pencil, self.mass, frequencies, loads, out)
+        solve_side_by_side(self._plan, (*pencil, self.mass), frequencies, loads, own, batches, out)
 
     def dynamic(self, speed: float, frequency: float) -> Complexes:
         """Dynamic stiffness (size, size) at a speed of the input and an angular frequency, rad/s."""

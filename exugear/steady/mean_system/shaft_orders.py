@@ -19,7 +19,6 @@ n = h z + r of a gear with z teeth is its part r beside the cycle h of the mesh,
 
 from __future__ import annotations
 
-import cmath
 import itertools
 import math
 from collections.abc import Mapping
@@ -40,13 +39,15 @@ from exugear.steady.harmonics.lines import (
 )
 from exugear.steady.mean_system.mesh_waves import MeshWaves
 from exugear.steady.mean_system.planet_sets import PlanetSet
+from exugear.steady.mean_system.standing_loads import reactions
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.system.kernels.meshes import FRAME
 from exugear.system.kernels.turning import travelling_tangent
-from exugear.system.kernels.varying_loads import VaryingLoadArrays, no_varying_loads, size_and_phase
+from exugear.system.kernels.varying_loads import VaryingLoadArrays, fill_sizes_and_phases, no_varying_loads
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
+from fe_ste.tools.bundles import cached_bundle
 
 NEGLECTED = 1e-2
 """Share of the root mean square of a mesh component's deviations in orders that are left out."""
@@ -76,8 +77,8 @@ class ShaftOrders:
     displacement: Complexes = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
     """(t, m) deviations of the mesh components, m."""
     reaction: Complexes = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
-    """(t, size) generalized forces in the rotating frame, by the static forces on deviations and of stated loads, these
-    per size at a speed."""
+    """(t, size + 6 r) generalized forces in the rotating frame, by the static forces on deviations and of stated loads,
+    these per size at a speed; behind them reactions on fixed bodies, as `reactions` has them."""
     source: tuple[str, ...] = ()
     """(t,) name of the excitation that a term is of; empty for deviations."""
     loads: VaryingLoadArrays = field(default_factory=no_varying_loads)
@@ -116,16 +117,16 @@ class ShaftOrders:
         return replace(self, sidebands=own)
 
     def reaction_at(self, speed: float, static: Floats) -> Complexes:
-        """Generalized forces (t, size) at a speed of the input (rad/s) and static deflections (size,)."""
-        factors = np.ones(len(self.load), dtype=complex)
-        angles = self.loads.order * (self.angles @ static) if len(self.angles) else np.zeros(0)
-        for n in np.unique(self.load[self.load >= 0]).tolist():
-            size, phase = size_and_phase(n, speed * self.speeds[n], self.loads)
-            factors[self.load == n] = cmath.rect(size, phase + angles[n])
+        """Find forces and reactions (t, size + 6 r) at a speed of the input (rad/s), static deflections (size,)."""
+        found = np.empty((len(self.speeds), 2))
+        fill_sizes_and_phases(speed * self.speeds, cached_bundle(self.loads), found)
+        # Deviations, whose number of a load is -1, have the factor behind those of all loads.
+        angles = found[:, 1] + self.loads.order * (self.angles @ static) if len(found) else found[:, 1]
+        factors = np.append(found[:, 0] * np.exp(1j * angles), 1.0)[self.load]
         return np.asarray(self.reaction * factors[:, None])
 
-    def change_by_turning(self, sampling: TorusSampling, motion: Complexes, speed: float, static: Floats) -> Floats:
-        """Sample how generalized forces (samples, size) of stated loads change with the turning of their bodies.
+    def change_by_turning(self, sampling: TorusSampling, motion: Complexes, speed: float, static: Floats) -> Complexes:
+        """Find how forces and reactions (lines, size + 6 r) change with the turning of the stated loads' bodies.
 
         An angle d that a vibration adds to that of a body multiplies a load of order n by exp(i n d). Loads on single
         planets are left as they are.
@@ -142,7 +143,10 @@ class ShaftOrders:
         added = self.loads.order[loads] * sampling.values(motion @ self.angles.T)[:, loads]
         angles = sampling.angles @ self.multiples[own].T
         turned = np.exp(1j * (sense * angles + added)) - np.exp(1j * sense * angles)
-        return np.asarray(2.0 * (turned @ self.reaction_at(speed, static)[own]).real)
+        # Fewer terms than forces pass through the transform: 2 Re(t r) = 2 (Re t Re r - Im t Im r).
+        real, imaginary = sampling.coefficients(turned.real), sampling.coefficients(turned.imag)
+        reaction = self.reaction_at(speed, static)[own]
+        return np.asarray(2.0 * (real @ reaction.real - imaginary @ reaction.imag))
 
     def places(self, lines: LineSet) -> Places:
         """Places of the terms among lines."""
@@ -218,6 +222,8 @@ class _Series:
         """Order of each rotation, by its name; those of carriers whose planets mesh out of phase come first."""
         self.displacement: dict[tuple[int, Key], Complexes] = {}
         self.reaction: dict[tuple[int, Key], Complexes] = {}
+        self.reactions = reactions(assembly)
+        self.without_reactions = np.zeros(self.reactions.shape[1])
         self.beside: list[tuple[Key, int | None, int | None]] = []
         """Rotations, the base of the mesh beside whose harmonics they appear if any, and the highest of these."""
 
@@ -249,7 +255,7 @@ class _Series:
                     if not key and (order or turn):  # at rest it counts with its conjugate
                         displaced, pushed = (2.0 * part.real.astype(complex) for part in (displaced, pushed))
                     self._add(self.displacement, (DEVIATION, key), displaced)
-                    self._add(self.reaction, (DEVIATION, key), pushed)
+                    self._add(self.reaction, (DEVIATION, key), np.append(pushed, self.without_reactions))
                     sizes[nearest] = math.hypot(sizes.get(nearest, 0.0), float(np.linalg.norm(displaced)))
         sizes.pop((), None)
         if sizes:
@@ -266,6 +272,7 @@ class _Series:
         entries = slice(arrays.first[number], arrays.first[number + 1])
         wave = np.zeros(self.assembly.size, dtype=complex)
         wave[arrays.coordinate[entries]] = arrays.wave[entries] @ (0.5, 0.5j)
+        wave = np.append(wave, 0.5 * self.reactions[number])
         for key, turned in self._in_frame(load.body, load.order, wave):
             self._add(self.displacement, (number, key), np.zeros(len(self.waves.waves), dtype=complex))
             self._add(self.reaction, (number, key), turned)
@@ -287,7 +294,7 @@ class _Series:
         return found
 
     def _in_frame(self, body: str, order: float, wave: Complexes) -> list[tuple[Key, Complexes]]:
-        """Multiples of rotations, and generalized forces (size,) in the rotating frame, of a load on a body."""
+        """Multiples of rotations, and forces in the rotating frame and reactions (size + 6 r,), of a load on a body."""
         planets = next((planets for planets in self.frame.sets if body in planets.names), None)
         if planets is None:
             speed = self.frame.speeds[body]
@@ -309,8 +316,9 @@ class _Series:
         ]
 
     def _turned(self, psi: float, wave: Complexes) -> Complexes:
-        """Generalized forces (size,) in the rotating frame at an angle of the input, rad."""
-        return np.asarray(self.frame.matrices(psi)[0].T @ wave)
+        """Return forces in the rotating frame at an angle of the input (rad), and reactions, (size + 6 r,)."""
+        size = self.assembly.size
+        return np.append(self.frame.matrices(psi)[0].T @ wave[:size], wave[size:])
 
     def found(self) -> ShaftOrders:
         """Return what was collected."""

@@ -16,7 +16,15 @@ import numpy as np
 from exugear.steady.mean_system.mean_system import MeanSystem, place_step
 from exugear.steady.mean_system.mesh_waves import MeshWaves, wave_name
 from exugear.steady.mean_system.planet_sets import PlanetSet
-from exugear.steady.mean_system.standing_loads import GEAR_FORCE, GEAR_MOMENT, moment_supports, standing_gears
+from exugear.steady.mean_system.standing_loads import (
+    GEAR_FORCE,
+    GEAR_MOMENT,
+    REACTION_FORCE,
+    REACTION_MOMENT,
+    moment_supports,
+    reacting_excitations,
+    standing_gears,
+)
 from exugear.system.kernels.coordinates import TILT
 from exugear.system.modes import overall_row
 from exugear.system.signals import coupling_rows, turning_bodies
@@ -80,13 +88,19 @@ class SignalRows:
 
 
 def mesh_signal_names(waves: MeshWaves) -> tuple[SignalName, ...]:
-    """Names of errors and forces of the meshes and of loads of gears; forces of as many waves as there are planets."""
+    """Names of errors and forces of the meshes, of loads of gears and of reactions of excitations.
+
+    There are forces of as many waves as there are planets.
+    """
     errors = tuple(SignalName(f"mesh_dte {wave.name}", "mesh_dte", "m") for wave in waves.waves)
     forces = tuple(SignalName(f"mesh_force {waves.waves[n].name}", "mesh_force", "N") for n in waves.force_waves)
+    standing = [(GEAR_FORCE, GEAR_MOMENT, gear) for gear in standing_gears(waves.assembly)]
+    reacting = reacting_excitations(waves.assembly.gearbox)
+    standing += [(REACTION_FORCE, REACTION_MOMENT, excitation) for excitation in reacting]
     loads = tuple(
-        SignalName(f"{quantity} {gear} {axis}", quantity, units)
-        for gear in standing_gears(waves.assembly)
-        for quantity, units in ((GEAR_FORCE, "N"), (GEAR_MOMENT, "N m"))
+        SignalName(f"{quantity} {name} {axis}", quantity, units)
+        for force, moment, name in standing
+        for quantity, units in ((force, "N"), (moment, "N m"))
         for axis in AXES
     )
     return (*errors, *forces, *loads)

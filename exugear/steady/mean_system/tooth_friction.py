@@ -24,6 +24,17 @@ from fe_ste.tools.arrays import Complexes
 def tooth_friction(waves: MeshWaves, lines: LineSet, ports: MeshInterface, speed: float, harmonics: int) -> Complexes:
     """Return the generalized forces (n, size) of the friction of all meshes at a speed of the input (rad/s).
 
+    Parameters and errors are those of `friction_parts`.
+    """
+    parts = friction_parts(waves, lines, ports, speed, harmonics)
+    rows = np.array([element.friction_rows for element in waves.assembly.elements])
+    gradients = np.stack([waves.gradients(rows[:, part], speed) for part in range(FRICTION_PARTS)], axis=1)
+    return np.tensordot(parts, gradients * waves.weights[:, None, None], axes=2)
+
+
+def friction_parts(waves: MeshWaves, lines: LineSet, ports: MeshInterface, speed: float, harmonics: int) -> Complexes:
+    """Return force and moments (n, m, `FRICTION_PARTS`) of friction along their rows at a speed of the input (rad/s).
+
     Parameters
     ----------
     ports : of the meshes at this speed
@@ -51,9 +62,6 @@ def tooth_friction(waves: MeshWaves, lines: LineSet, ports: MeshInterface, speed
         for part, samples in enumerate(element.friction):
             found = fourier_coefficients(size * samples, harmonics)
             cycles[part, m, : len(found)] = found
-    rows = np.array([element.friction_rows for element in assembly.elements])
-    gradients = np.stack([waves.gradients(rows[:, part], speed) for part in range(FRICTION_PARTS)], axis=1)
-    weighted = gradients * waves.weights[:, None, None]
     spectra = {(part, 0): own for part, own in enumerate(cycles)}
     everywhere = np.zeros((len(elements), FRICTION_PARTS))
     everywhere[:, 0] = [wave.wave == 0 for wave in waves.waves]
@@ -62,5 +70,4 @@ def tooth_friction(waves: MeshWaves, lines: LineSet, ports: MeshInterface, speed
         lines, tuple(group_of(own, harmonics, FRICTION_PARTS, lines.index.shape[1]) for own in kinds)
     )
     functions = CycleFunctions(waves, kinds, spectra, FRICTION_PARTS).at(ports, speed)
-    forces = coupling.of_constants(functions, everywhere.ravel())
-    return np.asarray(forces @ weighted.reshape(-1, weighted.shape[2]))
+    return coupling.of_constants(functions, everywhere.ravel()).reshape(-1, *everywhere.shape)

@@ -107,6 +107,7 @@ def _files(gearbox: Gearbox, key: str, external: ExternalSection) -> MatrixFiles
         names=names,
         gyroscopic=path("gyroscopic", external.gyroscopic),
         recovery=path("recovery", external.recovery),
+        recovery_matrix=path("recovery_matrix", external.recovery_matrix),
     )
 
 

@@ -386,7 +386,8 @@ def _solid_blanks(gearbox: Gearbox, body: Body, solid: SolidSection, names: list
 def node_numbers(gearbox: Gearbox, name: str) -> dict[str, int]:
     """Return the node number of each seat of a flexible body in files for other programs.
 
-    A body from matrices keeps their numbers; the seats of a solid are numbered from 1.
+    A body from matrices keeps their numbers; the seats of a solid are numbered from 1. Reactions of excitations without
+    a seat of their own are at the main seat.
 
     Raises
     ------
@@ -400,12 +401,13 @@ def node_numbers(gearbox: Gearbox, name: str) -> dict[str, int]:
         external = external_body(gearbox, name)
         names = [seat.name for seat in external.model.seats]
         numbers = dict(zip(names, placed_matrices(external.model).nodes, strict=False))
-        shared = external.shared_seats
+        shared, main = external.shared_seats, external.main_seat
     else:
         solid = solid_body(gearbox, name)
         numbers = {seat.name: number for number, seat in enumerate(solid.model.seats, start=1)}
-        shared = solid.shared_seats
-    return numbers | {seat: numbers[other] for seat, other in shared.items()}
+        shared, main = solid.shared_seats, solid.main_seat
+    reacting = (own.excitation for own in gearbox.varying_loads if own.reaction_on == name)
+    return dict.fromkeys(reacting, numbers[main]) | numbers | {seat: numbers[own] for seat, own in shared.items()}
 
 
 def solids_of(gearbox: Gearbox) -> Iterator[tuple[str, SolidModel]]:

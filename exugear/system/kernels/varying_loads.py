@@ -67,6 +67,13 @@ def size_and_phase(n: int, speed: float, loads: VaryingLoadArrays) -> tuple[floa
 
 
 @kernel
+def fill_sizes_and_phases(speeds: Floats, loads: VaryingLoadArrays, found: Floats) -> None:
+    """Fill sizes and phases (l, 2) of all loads at the speeds of their bodies (l,), rad/s."""
+    for n in range(speeds.size):
+        found[n, 0], found[n, 1] = size_and_phase(n, speeds[n], loads)
+
+
+@kernel
 def add_varying_loads(q: Floats, v: Floats, loads: VaryingLoadArrays, f: Floats) -> None:
     """Add the generalized forces of all loads at coordinates q and velocities v to f."""
     for n in range(loads.turning.size):

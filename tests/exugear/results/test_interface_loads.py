@@ -20,12 +20,16 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.units import RPM
 from exugear.project import Project
-from exugear.results.interface_loads import COLUMNS, interface_loads, loads_csv, nastran_loads
+from exugear.results.interface_loads import COLUMNS, interface_loads, loaded_seats, loads_csv, nastran_loads
 from exugear.steady.settings import SpeedRange, SteadySettings
-from exugear.steady.steady_file import steady_response
+from exugear.steady.steady_file import steady_response, to_dataset, with_names
+from exugear.steady.steady_response import response_of
+from exugear.system.bodies.of_gearbox import node_numbers
 from exugear.system.build import assemble
 from exugear.system.statics import static_state
 
+from ..cases.assembled import assembled
+from ..cases.box import box_content
 from ..cases.command import exugear
 from ..cases.spur import SPUR_CASE
 
@@ -111,6 +115,37 @@ def test_the_table_has_a_row_for_each_number(spur: Gearbox, response: xr.Dataset
     assert (row["seat"], row["node"], row["direction"], row["unit"]) == ("bearing_2", "12", "z", "N")
     assert float(row["frequency_Hz"]) == pytest.approx(float(row["order"]) * float(row["speed_rpm"]) / 60.0)
     assert float(row["real"]) == pytest.approx(loads[-1].load[-1, 1, 2].real, rel=1e-8)
+
+
+STATOR = {"body": "shaft_1", "orders": [6], "z_mm": 20.0, "force_N": [[30.0, 0.0, 4.0]], "torque_N_m": [5.0]}
+
+
+@pytest.mark.parametrize("seat", ["stator", None])
+def test_the_reaction_of_a_stator_acts_at_its_seat_on_a_flexible_housing(tmp_path: Path, seat: str | None) -> None:
+    """Opposite to the load on the rotor, about its seat, else about the main seat of the housing."""
+    case = box_content(tmp_path)
+    case["excitations"] = {"stator": {**STATOR, "reaction_on": "box", "phase_deg": [40.0]}}
+    place = np.array([-0.0125, 0.0, -0.012])
+    if seat is not None:
+        own = {"diameter_mm": 60.0, "inner_diameter_mm": 0.0, "position_mm": (1e3 * place).tolist()}
+        case["bodies"]["box"]["solid"]["seats"][seat] = own
+    gearbox = Gearbox.from_dict(case, str(tmp_path / "case.toml"))
+    assembly = assembled(gearbox, Choice("flexible"), {"spur": 3e8})
+    body = assembly.elastic_bodies["box"]
+    node = node_numbers(gearbox, "box")["stator"]
+    assert body.reduced.seats[node - 1].name == (seat or body.main_seat)
+    lever = np.array([0.0, 0.0, 0.02]) - body.reduced.seats[node - 1].position
+    settings = SteadySettings(SpeedRange.from_text("600:1200:3"), "linear", at_resonances=False)
+    data = with_names(to_dataset(response_of(assembly, settings)))
+    (loads,) = interface_loads(gearbox, data, [1], dict.fromkeys(loaded_seats(gearbox, data), node))
+    assert loads.seats[-1] == "stator"
+    line = int(np.argmin(np.abs(loads.order - 6.0)))
+    force = -np.array([30.0, 0.0, 4.0])
+    wanted = np.concatenate([force, [0.0, 0.0, -5.0] + np.cross(lever, force)]) * np.exp(1j * np.radians(40.0))
+    # The angle of the shaft under its static torque adds to the phase.
+    np.testing.assert_allclose(loads.load[line, -1], wanted, rtol=0.0, atol=2e-2)
+    np.testing.assert_allclose(np.abs(loads.load[line, -1]), np.abs(wanted), rtol=1e-5, atol=1e-6)
+    assert np.abs(np.delete(loads.load[:, -1], line, axis=0)).max() < 1e-9
 
 
 def wide_cards(text: str) -> list[list[str]]:

@@ -16,6 +16,7 @@ from exugear.system.build import assemble
 
 from ..cases.bearing import BEARING_CASE, NON_LINEAR
 from .test_steady_in_time import solver_of
+from .test_tooth_friction import curves_with_friction
 
 FOUR = {"bodies.planet.planet_angles_deg": [0.0, 90.0, 180.0, 270.0]}
 """Out of phase, so that lateral forces do not cancel."""
@@ -49,7 +50,10 @@ def accelerating_load(assembly, still, moved):
 
 
 def standing_load(gearbox, names, values):
-    """Force and moment (6,) about the origin on all moving bodies by bearings and meshes on what stands still."""
+    """Force and moment (6,) about the origin on all moving bodies by bearings and meshes on what stands still.
+
+    Those of excitations on a rigid fixed body, whose place is that on the axis of the body that they act on, follow.
+    """
 
     def of(quantity, name):
         return np.array([values[names.index(f"{quantity} {name} {axis}")] for axis in AXES])
@@ -62,6 +66,9 @@ def standing_load(gearbox, names, values):
         for gear, z in body.wheels.items() if body.fixed else ():
             force = of("gear_force", gear)
             total -= np.concatenate([force, of("gear_moment", gear) + np.cross([*body.axis, z], force)])
+    for name, place in {load.excitation: load.position for load in gearbox.varying_loads}.items():
+        force = of("reaction_force", name)
+        total -= np.concatenate([force, of("reaction_moment", name) + np.cross(place, force)])
     return total
 
 
@@ -98,6 +105,37 @@ def test_loads_on_bearings_and_ring_of_the_grc_accelerate_its_bodies(grc, stiffn
     error = (given - needed).std(axis=0) / size
     assert error[:3].max() < 1e-5
     assert error[3:].max() < 2e-3
+
+
+STATOR = {
+    "body": "hss",
+    "reaction_on": "housing",
+    "orders": [2, 6],
+    "z_mm": 1500.0,
+    "force_N": [[300.0, 200.0, 50.0], [100.0, 100.0, 0.0]],
+    "moment_N_m": [[0.0, 40.0], [20.0, 0.0]],
+    "torque_N_m": [60.0, 30.0],
+    "phase_deg": [20.0, 70.0],
+}
+
+
+@pytest.mark.validation
+def test_friction_of_teeth_and_reactions_of_excitations_are_among_the_loads_of_the_grc(grc, stiffness):
+    """Together with them all loads accelerate the bodies; each of both is far larger than the tolerance."""
+    gearbox = grc.varied(FOUR | {"damping.tooth_friction": 0.05, "excitations": {"stator": STATOR}})
+    assembly = assemble(gearbox, Choice("bushing"), curves_with_friction(gearbox, stiffness))
+    solver = solver_of(assembly, (1.0, 22.5), "parametric")
+    needed, given = both_loads(gearbox, solver, SPEED, 30.0)
+    size = needed.std(axis=0)
+    error = (given - needed).std(axis=0) / size
+    assert error[:3].max() < 1e-5
+    assert error[3:].max() < 2e-3
+    names = [name.name for name in solver.model.signal_names]
+    response = solver.response(SPEED)
+    friction = solver.model.friction_on_gears(SPEED)
+    reaction = signals(solver.model, response)[:, names.index("reaction_force stator x") :][:, :6]
+    assert np.abs(friction[1:, :3]).max() > 1e-3 * size[:3].max()
+    assert np.abs(reaction[1:]).max(axis=0) == pytest.approx([150.0, 100.0, 25.0, 10.0, 20.0, 30.0])
 
 
 @pytest.mark.validation

@@ -72,11 +72,13 @@ class MatrixFiles:
     gyroscopic: Path | None = None
     recovery: Path | None = None
     """Surface, see `exugear.system.bodies.matrix_files.recovery`."""
+    recovery_matrix: Path | None = None
+    """Its recovery matrix in an op4 file."""
 
     @property
     def paths(self) -> tuple[Path, ...]:
         """All files."""
-        given = (self.file, self.stiffness, self.mass, self.nodes, self.gyroscopic, self.recovery)
+        given = (self.file, self.stiffness, self.mass, self.nodes, self.gyroscopic, self.recovery, self.recovery_matrix)
         return tuple(path for path in given if path is not None)
 
 
@@ -125,7 +127,7 @@ def read_matrices(files: MatrixFiles) -> InterfaceMatrices:
         more["gyroscopic"] = _chosen(files.gyroscopic, found, others, "gyroscopic", files)
     if files.recovery is None:
         return interface_matrices(matrices["stiffness"], matrices["mass"], table, path, more)
-    recovery = read_recovery(files.recovery)
+    recovery = read_recovery(files.recovery, files.recovery_matrix)
     more["normal_motion"] = recovery.normal_motion
     combined = interface_matrices(matrices["stiffness"], matrices["mass"], table, path, more)
     return with_surface(combined, recovery, files.recovery)

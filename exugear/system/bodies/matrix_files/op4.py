@@ -42,6 +42,12 @@ _WIDE, _NARROW = 16, 8
 """Columns of an integer in a text."""
 _FORMAT = re.compile(r"(?:1P,?)?(\d{1,2})[ED](\d{1,2})\.\d")
 _SPARSE = 0
+RECOVERY = "MUG1"
+"""Name of the recovery matrix, a row for each displacement that follows from the coordinates, its columns."""
+MOST_ROWS = 1_200_000
+"""Largest number of these rows."""
+_FULL = 20
+"""Entries of a recovery matrix over those in the file, at most: it is full, and memory follows the size of the file."""
 
 
 @dataclass
@@ -67,6 +73,14 @@ class _Matrix:
                 f"{self.path}: matrix {self.name} is complex; write real matrices, and state structural damping by "
                 "loss_factor"
             )
+        if self.name == RECOVERY:
+            check_size(self.columns, self.path, self.name)
+            if not 0 < self.rows <= MOST_ROWS:
+                raise MatrixFileError(
+                    f"{self.path}: matrix {self.name} has {self.rows} rows; 1 to {MOST_ROWS} are read; keep the nodes "
+                    "of the outer surface only"
+                )
+            return
         if self.columns != self.rows:
             raise MatrixFileError(
                 f"{self.path}: matrix {self.name} is {self.rows} x {self.columns}; expected a square one"
@@ -87,6 +101,12 @@ class _Matrix:
         self.pieces.append((row - 1, column - 1, values))
 
     def complete(self) -> LabelledMatrix:
+        stored = sum(len(values) for _, _, values in self.pieces)
+        if self.name == RECOVERY and self.rows * self.columns > _FULL * stored:
+            raise MatrixFileError(
+                f"{self.path}: matrix {self.name} has {self.rows} x {self.columns} entries, but {stored} in the file, "
+                "which is damaged; write it again"
+            )
         matrix = np.zeros((self.rows, self.columns))
         for row, column, values in self.pieces:
             matrix[row : row + len(values), column] = values

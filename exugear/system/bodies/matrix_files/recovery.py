@@ -4,7 +4,8 @@ An NPZ file has one of two forms; n coordinates, six of each of `nodes` (s,), th
 
 points
     `points` (p, 3), outward unit `normals` (p, 3) and `areas` (p,) of the outer surface, and the recovery matrix
-    `displacement` (3 p, n): rows are the displacements of each point along x, y and z.
+    `displacement` (3 p, n): rows are the displacements of each point along x, y and z. It may be in an op4 file as MUG1
+    instead, also with rotations after the displacements of each point (6 p, n).
 integral
     `normal_motion` (n, n), the integral of (n . u)(n . u)^T over the outer surface, and its `area`, as
     `exugear.system.bodies.outer_surface` has it.
@@ -19,6 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from exugear.system.bodies.matrix_files.interface import InterfaceMatrices, Label, LabelledMatrix, MatrixFileError
+from exugear.system.bodies.matrix_files.op4 import RECOVERY, read_op4
 from exugear.system.bodies.matrix_files.plain import read_arrays, six_each
 from fe_ste.tools.arrays import Floats
 
@@ -46,8 +48,12 @@ class Recovery:
     """(6, 6) the same of translations and of rotations about the origin by the places of the points, if it has some."""
 
 
-def read_recovery(path: Path) -> Recovery:
+def read_recovery(path: Path, displacements: Path | None = None) -> Recovery:
     """Read the surface of a body, in the units and axes of its files.
+
+    Parameters
+    ----------
+    displacements : op4 file with the recovery matrix, if the surface has none
 
     Raises
     ------
@@ -55,7 +61,10 @@ def read_recovery(path: Path) -> Recovery:
         The file is no NPZ file, is truncated, lacks an array, or an array has another shape than the others demand.
     """
     if path.suffix.lower() != ".npz":
-        raise MatrixFileError(f"{path}: unknown format of a surface; its name must end in .npz")
+        raise MatrixFileError(
+            f"{path}: unknown format of a surface; its name must end in .npz: write points, normals, areas and nodes, "
+            "and the recovery matrix as displacement, or set recovery_matrix to an op4 file with MUG1"
+        )
     arrays = read_arrays(path, ("nodes",), ("modal", *OF_POINTS, *OF_INTEGRAL), 3 * MOST_POINTS)
     for name, values in arrays.items():
         if not np.isfinite(values).all():
@@ -73,6 +82,10 @@ def read_recovery(path: Path) -> Recovery:
                 "rows for each of nodes and one for each of modal, and a positive number"
             )
         return Recovery(LabelledMatrix(matrix.astype(np.float64), labels), float(area.ravel()[0]))
+    if displacements is not None:
+        if "displacement" in arrays:
+            raise MatrixFileError(f"{path}: has the array displacement; remove it, or the key recovery_matrix")
+        arrays["displacement"] = _of_op4(displacements, len(arrays.get("areas", ())))
     lacking = [name for name in OF_POINTS if name not in arrays]
     if lacking:
         raise MatrixFileError(f"{path}: no array {lacking[0]!r}; write {', '.join(OF_POINTS)}, and nodes")
@@ -101,6 +114,24 @@ def read_recovery(path: Path) -> Recovery:
         matrix += rows.T @ rows
     rigid = np.sqrt(areas)[:, None] * np.hstack([normals, np.cross(points, normals)])
     return Recovery(LabelledMatrix(matrix, labels), float(areas.sum()), rigid.T @ rigid)
+
+
+def _of_op4(path: Path, points: int) -> Floats:
+    """Read the recovery matrix (3 p, n) of p points from an op4 file."""
+    if path.suffix.lower() != ".op4":
+        raise MatrixFileError(f"{path}: unknown format of a recovery matrix; its name must end in .op4")
+    found, names = read_op4(path, frozenset((RECOVERY,)))
+    if RECOVERY not in found:
+        raise MatrixFileError(f"{path}: no matrix {RECOVERY}; matrices are {', '.join(names[:20])}")
+    values = found[RECOVERY].values
+    if len(values) == 6 * points:
+        return values.reshape(points, 2, 3, -1)[:, 0].reshape(3 * points, -1)
+    if len(values) == 3 * points:
+        return values
+    raise MatrixFileError(
+        f"{path}: matrix {RECOVERY} has {len(values)} rows; expected three or six for each of the {points} points of "
+        "the surface, in their order"
+    )
 
 
 def recovery_content(matrices: InterfaceMatrices) -> bytes:

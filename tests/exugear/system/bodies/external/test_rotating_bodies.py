@@ -13,6 +13,7 @@ import pytest
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
+from exugear.steady.balance.response import signals
 from exugear.steady.mean_system.mean_system import unsuitable
 from exugear.system.bodies.external import interface_of
 from exugear.system.bodies.external_of_gearbox import check_external, external_warnings
@@ -26,7 +27,8 @@ from ....cases.assembled import assembled, bodies_of
 from ....cases.beams import STEEL, beam_matrices, beams_between
 from ....cases.case_mutations import shaped_shafts
 from ....cases.ring import FACE, MIDDLE, OUTER, ring_content
-from .shared import STIFFNESS, write
+from ....cases.steady_runs import solver_of
+from .shared import STIFFNESS, largest_change, write
 
 pytestmark = needs_meshio
 
@@ -232,6 +234,34 @@ def test_a_ring_from_matrices_has_sectors(tmp_path: Path, grc: Gearbox, stiffnes
     assert np.abs((found.reduced.stiffness - wanted) / np.outer(scale, scale)).max() < 1e-12
     bushing = assembled(gearbox, Choice("bushing"), stiffness)
     assert not unsuitable(bushing, ("housing",))
+
+
+def test_a_ring_written_and_read_back_is_the_same_with_its_planets(
+    tmp_path: Path, grc: Gearbox, stiffness: dict[str, np.ndarray]
+) -> None:
+    """Modes and static state of the planetary stage, and its steady response with planets that pass the sectors."""
+    content = ring_content(grc, tmp_path)
+    wanted = assembled(Gearbox.from_dict(content, str(tmp_path / "case.toml")), Choice("flexible"), stiffness)
+    body = wanted.elastic_bodies["housing"]
+    numbers = {seat.name: number for number, seat in enumerate(body.reduced.seats, start=1)}
+    seats: dict[str, Any] = {"ring": {"sector_nodes": [numbers.pop(seat) for seat in body.sectors["ring"]]}}
+    seats |= {name: {"node": number} for name, number in numbers.items()}
+    del content["bodies"]["housing"]["solid"]
+    external = {**write(tmp_path, interface_of(body.reduced)), "units": "SI", "seats": seats}
+    content["bodies"]["housing"]["external"] = external
+    found = assembled(Gearbox.from_dict(content, str(tmp_path / "case.toml")), Choice("flexible"), stiffness)
+    assert largest_change(found, wanted) < 1e-9
+    solvers = [solver_of(assembly, (7.0, 9.0), "parametric", 4, 2) for assembly in (found, wanted)]
+    one, two = (signals(solver.model, solver.response(8.0)) for solver in solvers)
+    names = [name.name for name in solvers[0].model.signal_names]
+    assert names == [name.name for name in solvers[1].model.signal_names if name.name != "surface_velocity"]
+    change = np.abs(one - two[:, : len(names)])[1:].max(axis=0)
+    size = np.abs(two[1:, : len(names)]).max(axis=0)
+    quantities = np.array([name.split()[0] for name in names])
+    for quantity in np.unique(quantities):
+        own = quantities == quantity
+        # Some components are zero by symmetry, and so are all moments of these bearings.
+        assert change[own].max() < 1e-6 * size[own].max() + 1e-9 * size.max(), quantity
 
 
 @pytest.mark.parametrize(

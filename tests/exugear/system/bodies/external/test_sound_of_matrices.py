@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from exugear.gearbox.variant import Variant
 from exugear.results.sound.radiated_power import radiated_power, radiating_names
 from exugear.system.bodies.external_of_gearbox import check_external
 from exugear.system.bodies.matrix_files.files import MatrixFormat
-from exugear.system.bodies.matrix_files.interface import InterfaceMatrices
+from exugear.system.bodies.matrix_files.interface import InterfaceMatrices, MatrixFileError
 from exugear.system.bodies.matrix_files.recovery import read_recovery
 from exugear.system.system import Assembly
 
@@ -114,3 +115,70 @@ def test_a_surface_that_does_not_fit_is_one_error(
     with pytest.raises(GearboxFileError, match=message) as refused:
         check_external(gearbox, "box")
     assert len(refused.value.errors) == 1
+
+
+def dense_op4(values: np.ndarray, name: str = "MUG1") -> bytes:
+    """A matrix as records of Fortran with all values of each column, as OUTPUT4 writes it."""
+    rows, columns = values.shape
+
+    def record(content: bytes) -> bytes:
+        length = struct.pack("<i", len(content))
+        return length + content + length
+
+    found = record(struct.pack("<4i", columns, rows, 2, 2) + name.ljust(8).encode())
+    for number, column in enumerate(values.T, start=1):
+        found += record(struct.pack("<3i", number, 1, 2 * rows) + column.astype("<f8").tobytes())
+    return found + record(struct.pack("<3i", columns + 1, 1, 2) + struct.pack("<d", 1.0))
+
+
+@pytest.mark.parametrize("with_rotations", [False, True])
+def test_a_recovery_matrix_of_an_op4_file_is_that_of_the_surface(
+    tmp_path: Path, box: InterfaceMatrices, with_rotations: bool
+) -> None:
+    arrays = sphere(box)
+    np.savez(tmp_path / "whole.npz", **arrays)
+    displacement = arrays.pop("displacement")
+    np.savez(tmp_path / "sphere.npz", **arrays)
+    rows = displacement.reshape(400, 3, -1)
+    rotations = np.random.default_rng(2).normal(size=rows.shape)
+    rows = np.concatenate([rows, rotations], axis=1) if with_rotations else rows
+    content = dense_op4(rows.reshape(-1, displacement.shape[1]))
+    (tmp_path / "body.op4").write_bytes(dense_op4(np.eye(3), "KAAX") + content)
+    found = read_recovery(tmp_path / "sphere.npz", tmp_path / "body.op4")
+    wanted = read_recovery(tmp_path / "whole.npz")
+    assert np.array_equal(found.normal_motion.values, wanted.normal_motion.values)
+    keys = {"recovery": "sphere.npz", "recovery_matrix": "body.op4"}
+    gearbox = box_of(tmp_path, {**write(tmp_path, box), **keys})
+    check_external(gearbox, "box")
+    assert radiated_power(assembled(gearbox, Choice("flexible"), STIFFNESS)) is not None
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (dense_op4(np.ones((1201, 26))), r"MUG1 has 1201 rows; expected three or six for each of the 400 points"),
+        (dense_op4(np.ones((1200, 25))), r"array displacement has the shape \(1200, 25\); expected \(1200, 26\)"),
+        (dense_op4(np.eye(3), "KAAX"), "no matrix MUG1; matrices are KAAX"),
+        (dense_op4(np.ones((1200, 26)))[:-5000], "truncated"),
+        (
+            dense_op4(np.ones((12, 2))).replace(struct.pack("<2i", 2, 12), struct.pack("<2i", 2, 1_000_000), 1),
+            "MUG1 has 1000000 x 2 entries, but 24 in the file",
+        ),
+    ],
+)
+def test_a_recovery_matrix_that_does_not_fit_is_one_error(
+    tmp_path: Path, box: InterfaceMatrices, content: bytes, message: str
+) -> None:
+    arrays = sphere(box)
+    del arrays["displacement"]
+    np.savez(tmp_path / "sphere.npz", **arrays)
+    (tmp_path / "body.op4").write_bytes(content)
+    with pytest.raises(MatrixFileError, match=message):
+        read_recovery(tmp_path / "sphere.npz", tmp_path / "body.op4")
+    np.savez(tmp_path / "whole.npz", **sphere(box))
+    with pytest.raises(MatrixFileError, match=r"has the array displacement; remove it, or the key recovery_matrix"):
+        read_recovery(tmp_path / "whole.npz", tmp_path / "body.op4")
+    with pytest.raises(MatrixFileError, match=r"whole.npz: unknown format of a recovery matrix; .* end in .op4"):
+        read_recovery(tmp_path / "sphere.npz", tmp_path / "whole.npz")
+    with pytest.raises(GearboxFileError, match="recovery_matrix requires points, normals and areas of the surface"):
+        box_of(tmp_path, {**write(tmp_path, box), "recovery_matrix": "body.op4"})
