@@ -30,6 +30,7 @@ from exugear.studies.study import Output, errors_of_signals
 from exugear.system.loads import LoadTable
 from exugear.transient.compiled.solver import CompiledSystem
 
+from ...fe_ste.damage import damages
 from ...optional_libraries import needs_meshio
 from ..cases.assembled import assembled
 from ..cases.box import box_content
@@ -224,6 +225,31 @@ def test_velocities_of_the_surface_need_a_computed_speed(tmp_path, more, said):
     file = Path(json.loads(exugear("steady", case, *options, "--out", tmp_path, "--json").stdout)["file"])
     outcome = exugear("export", case, "--surface", file, "--out", tmp_path, *more)
     assert outcome.exit_code == 2 and said in " ".join(outcome.stderr.split())
+
+
+@pytest.mark.validation
+def test_velocities_of_the_surface_need_a_whole_response_and_room(tmp_path):
+    """Damaged responses are refused, and a file that is too large for the disk leaves nothing behind."""
+    resource = pytest.importorskip("resource", reason="limits of a POSIX system")
+    case = tmp_path / "box.toml"
+    case.write_text(toml_text(box_content(tmp_path)), encoding="utf-8")
+    options = ("--variant", "flexible", "--mesh-model", "iso6336", "--speeds", "1400:1600", "--points", "2")
+    file = Path(json.loads(exugear("steady", case, *options, "--out", tmp_path, "--json").stdout)["file"])
+    asked = ("--speed", 1400, "--out", tmp_path, "--to", tmp_path / "to")
+    broken = tmp_path / "broken.nc"
+    for damaged in damages(file.read_bytes(), 12):
+        broken.write_bytes(damaged)
+        outcome = exugear("export", case, "--surface", broken, *asked)
+        assert outcome.exit_code == 2 and "broken.nc" in outcome.stderr, outcome.stderr
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, before[1]))
+    try:
+        outcome = exugear("export", case, "--surface", file, *asked)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert outcome.exit_code == 1 and "File too large" in outcome.stderr, outcome.stderr
+    assert not list((tmp_path / "to").glob("*"))
+    assert exugear("export", case, "--surface", file, *asked).exit_code == 0
 
 
 def test_a_rigid_housing_has_no_sound_power(housed):
