@@ -129,8 +129,8 @@ PARTS = (
     _column("life\nh", _shortest_life, life_text),
 )
 PART_LEGEND = (
-    "Damage: 1 is failure at the design probability. S_H, S_F: over the life, by finite elements, misaligned by "
-    "each load, with K_v; to ISO 6336: check --rating. Life: the shortest of L10, L10r and L10m."
+    "Damage: 1 is failure at the design probability. S_H, S_F: over the life, by finite elements with load factors, "
+    "misaligned by each load; to ISO 6336: check --rating. Life: the shortest of L10, L10r and L10m."
 )
 
 
