@@ -137,7 +137,7 @@ class Losses:
     bearings: tuple[BearingLoss, ...]
     seals: tuple[SealLoss, ...]
     without_data: tuple[str, ...]
-    """Bearings without catalogue data, whose friction is not included."""
+    """Bearings without friction: without catalogue data or with unknown loads (these need all bearings)."""
     assumed_roughness: bool
     """Whether the roughness of any gear is the usual one."""
 
@@ -252,7 +252,10 @@ def _at_temperature(
         ),
         bearings=bearings,
         seals=seals,
-        without_data=tuple(dict.fromkeys(b.family for b in gearbox.bearings if b.name in listed - known)),
+        without_data=(
+            *gearbox.unknown_bearings,
+            *dict.fromkeys(b.family for b in gearbox.bearings if b.name in listed - known),
+        ),
         assumed_roughness=any(
             _roughness(gearbox, gear.name) is None
             for mesh in gearbox.meshes

@@ -20,6 +20,7 @@ from exugear.gearbox.load_cases import inertia_at_input, operating_range, speeds
 from exugear.gearbox.parts import Bearing, Body, PairSpec, VaryingLoad, connector_matrix
 from exugear.gearbox.sections.designations import boundary_of
 from exugear.gearbox.units import MM, RPM, si
+from exugear.system.bearings.rolling.catalogue import similar_designation
 from exugear.system.bodies.seated_items import seat_width
 from fe_ste.geometry.checks import USUAL_TIP_THICKNESS
 from fe_ste.geometry.gears import Gear, GearPair
@@ -241,7 +242,15 @@ def _seats_beyond_shapes(gearbox: Gearbox) -> Iterator[str]:
 
 
 def _bearings(gearbox: Gearbox) -> Iterator[str]:
-    """Yield bearings with diameters other than their designation states, or than any bearing has."""
+    """Yield unknown designations, and diameters that differ from the designation or that no bearing has."""
+    for name, designation in gearbox.unknown_bearings.items():
+        near = similar_designation(designation)
+        hint = f"did you mean {near!r}? Otherwise add" if near else "add"
+        yield (
+            f"bearings.{name}.designation = {designation!r}: has no known dimensions and is left out; all shafts run "
+            f"aligned on ideal joints, without bearing loads and lives; {hint} [bearings.{name}.catalogue] or "
+            f"[bearings.{name}.stiffness]"
+        )
     for name, section in gearbox.case.bearings.items():
         catalogue = section.catalogue
         if catalogue is None:

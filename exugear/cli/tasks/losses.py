@@ -210,7 +210,7 @@ def _findings(summary: Mapping[str, Any]) -> Iterator[Finding]:
         yield Finding("warning", "the losses exceed the power of the static load: every loaded body has to be driven")
     if summary["bearings_without_data"]:
         names = ", ".join(summary["bearings_without_data"])
-        yield Finding("warning", f"no friction of bearings without a catalogue: {names}")
+        yield Finding("warning", f"no friction of bearings whose catalogue data or loads are not known: {names}")
     if unknown := [bearing["family"] for bearing in summary["bearings"] if not bearing["series"]]:
         text = f"unknown series of the bearings {', '.join(unknown)}: their friction is that of all series of the "
         yield Finding("warning", f"{text}type; set catalogue.designation or catalogue.series")

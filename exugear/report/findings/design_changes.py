@@ -259,8 +259,7 @@ def peaks_of(
     found = {}
     for quantity in response_quantities(data):
         sizes = quantity.sizes(amplitude).max(axis=2, initial=0.0)
-        ranged = sizes[within]
-        highest = ranged[:, dynamic_orders(ranged)].max(initial=0.0)
+        highest = sizes[within][:, dynamic_orders(sizes, within)].max(initial=0.0)
         found[quantity.name] = float(sizes[near].max(initial=0.0)), float(highest)
     return found
 

@@ -318,23 +318,26 @@ QUASI_STATIC = 1.25
 """Ratio of the highest to the lowest amplitude of an order in a range of speeds up to which it is quasi-static."""
 
 
-def dynamic_orders(amplitude: Floats) -> Booleans:
-    """Return which orders are not quasi-static.
+def dynamic_orders(amplitude: Floats, inside: Booleans) -> Booleans:
+    """Return which orders are not quasi-static within a range of speeds: they vary there, or have a ranked peak.
 
     Amplitudes of quasi-static orders hardly change with speed: the planets that pass, for instance, load bearings and
     teeth in the same way at any speed, and would hide what resonances do.
 
     Parameters
     ----------
-    amplitude : (points, orders) in a range of speeds
+    amplitude : (points, orders) over speed
+    inside : (points,) points in the range
 
     Examples
     --------
-    >>> dynamic_orders(np.array([[5.0, 1.0], [5.2, 3.0]]))
-    array([False,  True])
+    >>> amplitude = np.array([[5.0, 1.0, 5.0], [5.2, 3.0, 5.5], [5.3, 3.5, 5.0]])
+    >>> dynamic_orders(amplitude, np.ones(3, dtype=bool))
+    array([False,  True,  True])
     """
-    highest = amplitude.max(axis=0, initial=0.0)
-    return np.asarray(highest > QUASI_STATIC * amplitude.min(axis=0, initial=np.inf))
+    ranged = amplitude[inside]
+    varies = ranged.max(axis=0, initial=0.0) > QUASI_STATIC * ranged.min(axis=0, initial=np.inf)
+    return np.asarray(varies | [bool(inside[standing_peaks(own)].any()) for own in amplitude.T])
 
 
 def envelopes(data: xr.Dataset, within: tuple[float, float] | None = None) -> dict[str, Envelope]:
@@ -349,7 +352,7 @@ def envelopes(data: xr.Dataset, within: tuple[float, float] | None = None) -> di
     inside = np.ones(len(speed), bool) if within is None else (speed >= within[0]) & (speed <= within[1])
     found = {}
     for name, values in order_amplitudes(data).items():
-        counted = dynamic_orders(values[inside]) if within is not None else np.ones(values.shape[1], bool)
+        counted = dynamic_orders(values, inside) if within is not None else np.ones(values.shape[1], bool)
         found[name] = Envelope(speed, values[:, counted].max(axis=1, initial=0.0))
     return found
 

@@ -13,6 +13,7 @@ third value was misread and is omitted.
 from __future__ import annotations
 
 import csv
+import difflib
 import math
 import re
 from collections.abc import Callable, Mapping
@@ -488,6 +489,18 @@ def _listed_as(section: CatalogueSection) -> tuple[str, ...]:
     if section.type == "self_aligning_ball" and _SEALED.search(suffix):
         return ()
     return (number,)
+
+
+def similar_designation(designation: str) -> str:
+    """Return the listed designation that is most like another; empty if none is like it.
+
+    Examples
+    --------
+    >>> similar_designation("NU 3O9"), similar_designation("XY 1")
+    ('NU309E', '')
+    """
+    text = designation.upper().replace(" ", "").replace("O", "0")  # a letter that is typed for a zero
+    return next(iter(difflib.get_close_matches(text, [name for _, name in _listed()], n=1, cutoff=0.7)), "")
 
 
 @cache

@@ -64,6 +64,11 @@ def half_a_bore_without_designation(content: dict[str, Any]) -> None:
     content["bearings"]["input_left"]["catalogue"] |= {"bore_mm": 17.5, "designation": ""}
 
 
+def a_letter_for_a_zero(content: dict[str, Any]) -> None:
+    del content["bearings"]["output_left"]["catalogue"]
+    content["bearings"]["output_left"]["designation"] = "62O9"
+
+
 def a_bore_in_metres(content: dict[str, Any]) -> None:
     content["gears"]["planet"]["held_diameter_mm"] = 0.062
 
@@ -113,6 +118,12 @@ MISTAKES: dict[str, tuple[str, Callable[[dict[str, Any]], None], str]] = {
         "pair",
         half_a_bore_without_designation,
         "bearings.input_left.catalogue.bore_mm = 17.5: usual bearings of 72 mm outer diameter have a bore of at least",
+    ),
+    "designation": (
+        "pair",
+        a_letter_for_a_zero,
+        "bearings.output_left.designation = '62O9': has no known dimensions and is left out; all shafts run aligned on "
+        "ideal joints, without bearing loads and lives; did you mean '6209'?",
     ),
     "bore in m": ("planetary", a_bore_in_metres, "gears.planet.held_diameter_mm = 0.062: implausible"),
     "bore of a gear": (
