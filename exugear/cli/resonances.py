@@ -35,7 +35,7 @@ def highest_resonance(gearbox: Gearbox, ranking: Ranking) -> str:
     at = f"{first[f'{quantity}_at']}, " if f"{quantity}_at" in first else ""
     order = _order(gearbox).cell(first).replace(" × ", f"{HARD_SPACE}×{HARD_SPACE}")
     return (
-        f"Highest {label.column} ±{_amplitude(quantity, first)} {label.unit}: {at}{SPEED.cell(first)} rpm, "
+        f"Highest peak: {label.column} ±{_amplitude(quantity, first)} {label.unit}, {at}{SPEED.cell(first)} rpm, "
         f"{FREQUENCY.cell(first)} Hz, {order}"
     )
 

@@ -162,7 +162,7 @@ def speed_text(resonance: Resonance) -> str:
 
 def _kicker(headline: Headline) -> str:
     where = "at all computed speeds" if headline.ranking.whole else "within the operating range"
-    highest = f"Highest {QUANTITIES[headline.ranking.quantity].column}"
+    highest = f"Highest peak of the {QUANTITIES[headline.ranking.quantity].column}"
     if headline.ranking.without is not None:
         low, high = (rounded_text(speed / RPM) for speed in headline.ranking.without)
         return f"No resonance within the operating range, {low} to {high} rpm. {highest} at all computed speeds"

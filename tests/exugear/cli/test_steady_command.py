@@ -66,7 +66,7 @@ def test_the_sound_power_of_a_flexible_housing_follows_the_verdict_with_its_limi
     outcome = steady(case, *options, "--quantity", "sound_power", "--all")
     assert outcome.exit_code == 0, outcome.stderr
     first, second = outcome.stdout.splitlines()[:2]
-    assert first.startswith("Highest surface velocity ±")
+    assert first.startswith("Highest peak: surface velocity ±")
     assert second.startswith("Highest sound power ") and "dB(A), upper estimate: " in second
     assert "Sound power by order at" in outcome.stdout and "third octaves" in outcome.stdout
     said = " ".join(outcome.stderr.split())
