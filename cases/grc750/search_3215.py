@@ -35,6 +35,7 @@ from published import published_project
 from exugear import Choice, Gearbox, Project, assemble
 from exugear.steady.balance.excitation import HarmonicBalanceModel
 from exugear.steady.balance.response import transmission_errors
+from exugear.steady.harmonics.linear_solvers import batches_of
 from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.steady.point_solver import harmonic_balance_model
 from exugear.system.system import input_hash
@@ -182,7 +183,14 @@ def amplitudes(model: HarmonicBalanceModel, system: MeanSystem) -> dict[str, np.
     """Peak amplitude of the overall transmission error along `FREQUENCIES` by mesh order, m; NaN beyond the speeds."""
     speed = 0.5 * FASTEST
     ports = model.ports_at(speed)
-    motion = system.responses(speed, 2.0 * np.pi * FREQUENCIES, model.loads(ports))
+    loads = model.loads(ports)
+    count = len(FREQUENCIES)
+    motion = np.zeros((count, *loads.shape), dtype=complex)
+    # All loads at each frequency, and no others.
+    batches = batches_of(np.ones((count, loads.shape[1]), dtype=bool), np.zeros(count, dtype=bool))
+    pencil = system.stiffness_at(speed), system.damping_at(speed)
+    none = np.zeros((count, system.size), dtype=complex)
+    system.fill_responses(pencil, 2.0 * np.pi * FREQUENCIES, loads, none, batches, motion)
     seen = np.einsum("fsm,s->fm", motion, model.row_of_overall(speed))
     found, errors = {}, transmission_errors(model, ports, speed)
     for line in range(1, len(model.lines.index)):
