@@ -160,7 +160,8 @@ SpeedRpm = Annotated[float, _symmetric_range(1e6, 1e5)]
 Acceleration = Annotated[float, _symmetric_range(1000.0, 20.0, "m/s2")]
 
 # Life loads and rating.
-HoursPerYear = Annotated[float, Range(0.0, 8766.0, why="a year has 8766 hours")]
+HOURS_PER_YEAR = 8766.0
+HoursPerYear = Annotated[float, Range(0.0, HOURS_PER_YEAR, why="a year has 8766 hours")]
 EventsPerYear = Annotated[float, Range(0.0, 1e7, (0.0, 1e5))]
 WindSpeed = Annotated[float, Range(0.1, 100.0, (0.5, 15.0))]
 WeibullShape = Annotated[float, Range(0.5, 10.0, (1.5, 3.0))]

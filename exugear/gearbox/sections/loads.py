@@ -36,7 +36,7 @@ class WindSection(Section):
     """Width of the wind speed bins, the first centred at 0; files of one bin share its hours in proportion to their
     length.
     """
-    hours_per_year: q.HoursPerYear = 8766.0
+    hours_per_year: q.HoursPerYear = q.HOURS_PER_YEAR
     """Total hours of all wind speeds."""
 
 
@@ -137,6 +137,19 @@ class LoadsSection(Section):
             raise ValueError(f"sources.{asked[0]}.wind requires the section [loads.wind] with mean_m_per_s")
         if self.wind is not None and not asked:
             raise ValueError("wind: no source has a channel of the wind speed; set wind = ... in a source")
+        return self
+
+    @model_validator(mode="after")
+    def _hours(self) -> LoadsSection:
+        yearly = sum(
+            sum(source.hours or ()) / self.life_years if source.hours_per_year is None else source.hours_per_year
+            for source in self.sources.values()
+        )
+        if yearly > q.HOURS_PER_YEAR * (1.0 + 1e-9):
+            raise ValueError(
+                f"sources: {yearly:.6g} hours per year in total; a year has {q.HOURS_PER_YEAR:g}: reduce hours or "
+                "hours_per_year, or increase life_years"
+            )
         return self
 
 

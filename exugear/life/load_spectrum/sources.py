@@ -27,6 +27,7 @@ from exugear.exchange.series_files import (
 )
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import shortened
+from exugear.gearbox.sections.entries import HOURS_PER_YEAR
 from exugear.gearbox.sections.loads import LoadsSection, SourceSection, WindSection
 from exugear.gearbox.units import RPM
 from exugear.life.load_spectrum.counting import DurationDistribution, LoadPoints, load_duration, load_points
@@ -131,7 +132,6 @@ def _share(model: Model, case: RexsLoadCase, where: str) -> float:
     raise RexsError(f"{where}: no operating_time_fraction of the gear_unit")
 
 
-HOURS_PER_YEAR = 8766.0
 HUB_CELLS = 8
 """Number of cells of each rotor load into which torque bins are split."""
 SPECTRUM_HEADINGS = ("torque_N_m", "speed_rpm", "hours")

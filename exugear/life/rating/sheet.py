@@ -13,6 +13,7 @@ import numpy as np
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Mesh
+from exugear.gearbox.sections.entries import HOURS_PER_YEAR
 from exugear.gearbox.sections.loads import RatingSection
 from exugear.gearbox.units import MM, RPM, unit_of
 from exugear.gearbox.variant import Variant
@@ -28,7 +29,7 @@ from exugear.life.load_spectrum.counted import (
     tooth_exposures,
 )
 from exugear.life.load_spectrum.counting import LoadPoints, load_duration
-from exugear.life.load_spectrum.sources import HOURS_PER_YEAR, LoadSource
+from exugear.life.load_spectrum.sources import LoadSource
 from exugear.life.rating.standard import FlankRules, MeshLoads, rate
 from exugear.life.static_balance import ActingLoads, StaticBalance, acting_loads, static_balance
 from exugear.system.gearbox_checks import lacking, usual_variant

@@ -23,6 +23,7 @@ from exugear.exchange.rexs.to_case.notes import (
 )
 from exugear.exchange.rexs.to_case.toothing import material_of
 from exugear.exchange.rexs.tree import Component, Model, RexsError, RexsLoadCase
+from exugear.gearbox.sections.entries import HOURS_PER_YEAR
 from exugear.gearbox.units import RPM
 
 FORCES = ("force_u_direction", "force_v_direction", "force_w_direction")
@@ -31,7 +32,6 @@ UNKNOWN_TORQUE = 100.0
 """Torque if the file has no value, N m."""
 SPECTRUM = "load_spectrum.csv"
 """Name of the table of life loads in the folder of the gearbox file."""
-HOURS_PER_YEAR = 8766.0
 USUAL_YEARS, USUAL_VISCOSITY, USUAL_DYNAMIC_FACTOR, USUAL_ROUGHNESS, USUAL_ROOT_FACTOR, BOTH_WAYS = (
     20.0,
     220.0,
