@@ -215,7 +215,10 @@ def point_table(
     dataset: xr.Dataset, dimensions: Sequence[str], parameters: Sequence[str], outputs: Sequence[str]
 ) -> Table:
     """Return the results of all points: parameters and outputs with one value, in the units of the dataset."""
-    names = [name for name in (*parameters, *outputs) if name in dataset and set(dataset[name].dims) <= {*dimensions}]
+    known = [name for name in (*parameters, *outputs) if name in dataset]
+    names = [name for name in known if set(dataset[name].dims) <= {*dimensions}]
+    others = ", ".join(name for name in known if name not in names)
+    legend = f"In the file only, with several values at each point: {others}." if others else ""
     cells = [
         dataset[name].broadcast_like(dataset["seconds"]).transpose(*dimensions).to_numpy().ravel() for name in names
     ]
@@ -225,7 +228,7 @@ def point_table(
         unit = dataset[name].attrs.get("units", "")
         heading = name if unit in ("", "1") else f"{name}\n{unit}"
         columns.append(Column(heading, name, _point_value, is_detail=number > SHOWN_COLUMNS))
-    return Table("Results of the points", rows, columns, noun="points")
+    return Table("Results of the points", rows, columns, legend, noun="points")
 
 
 def _point_value(value: Any) -> str:

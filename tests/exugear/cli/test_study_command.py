@@ -58,6 +58,8 @@ def test_sweep_writes_a_dataset_and_sums_it_up(study):
     damping = data["damping"].to_numpy()
     assert damping[2] / damping[0] == pytest.approx(4.0, rel=1e-6)  # damping by time; one elastic mode
     assert json.loads(data.attrs["case"])["name"] == "one spur pair"
+    # One of the outputs has a dimension of its own, which no row of the table can hold.
+    assert "In the file only, with several values at each point: frequency." in sweep(study, "--workers", 1).stdout
     assert json.loads(data.attrs["study"])["parameters"]["seat"]["values"] == [1e-6, 2e-6, 4e-6]
     again = sweep(study, "--workers", 1)
     assert again.exit_code == 0 and "0 computed now" in again.stdout
