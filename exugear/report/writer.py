@@ -27,6 +27,7 @@ from exugear.report.findings.context import (
     stored_models,
     with_responses,
 )
+from exugear.report.findings.design_changes import DesignStudy
 from exugear.report.findings.groups import groups_of
 from exugear.report.findings.headline import Headline, headline_of
 from exugear.report.findings.other_design import read_other_design
@@ -133,6 +134,8 @@ class Report:
     """Ranking of the page; None if nothing is ranked."""
     findings: tuple[Finding, ...] = ()
     """Checks of the results that the ranking is from."""
+    design_study: DesignStudy | None = None
+    """Design changes on the page, computed before."""
 
 
 def write_report(
@@ -206,6 +209,7 @@ def write_report(
         gearbox,
         material.headline,
         tuple(notes.findings),
+        material.design_study,
     )
 
 

@@ -214,8 +214,9 @@ def _parallel_worker() -> AbstractContextManager[Executor | None]:
 def _outcome(folder: Path, written: Report, study: DesignStudy | None) -> Outcome:
     spent = times_spent(folder)
     lists = {name: list(getattr(written, name)) for name in ("statements", "resonances", "missing", "left_out")}
-    changes = [{**asdict(one), "recommended": one.recommended} for one in (study.results if study else ())]
-    found = {"design_changes": changes, "design_changes_loads": list(study.loads) if study else []}
+    shown = study or written.design_study
+    changes = [{**asdict(one), "recommended": one.recommended} for one in (shown.results if shown else ())]
+    found = {"design_changes": changes, "design_changes_loads": list(shown.loads) if shown else []}
     tables = [Table("Run time, last execution of each step", spent, TIMES, "Parallel steps overlap.")]
     verdict = written.statements[0] if written.statements else "No results to summarise"
     if written.headline is not None:
@@ -271,7 +272,7 @@ def _changes(study: DesignStudy) -> Table:
         rows.append(row)
     title = f"Design changes for resonance {study.number}, {study.frequency:.3g} Hz at {abs(study.speed) / RPM:.4g} rpm"
     title += f", {study.line}, dB; loads: {', '.join(study.loads)}"
-    legend = "here: this peak; range: highest amplitude of any order. Only recommended changes are rated."
+    legend = "here: this peak; range: highest amplitude of any order. Rated: changes that are recommended otherwise."
     return Table(title, rows, columns, legend, noun="changes")
 
 
