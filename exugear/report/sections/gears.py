@@ -193,7 +193,9 @@ def _contact_row(material: ReportData, own: PairContact) -> dict[str, object]:
         factors = material.ratings.safety_factors(own.family)
         for name, least in (("S_H", required.minimum_S_H), ("S_F", required.minimum_S_F)):
             value = factors.get(name, math.nan)
-            row[name] = Cell("–" if math.isnan(value) else f"{value:.2f}", value, tag="mind" if value < least else "")
+            row[f"{name}, life"] = Cell(
+                "–" if math.isnan(value) else f"{value:.2f}", value, tag="mind" if value < least else ""
+            )
     return row
 
 
