@@ -46,7 +46,8 @@ def new(
     if as_json:
         print_json({"case": str(case), "kind": kind.value})
         return
-    say(f"Template {kind.value}: {KINDS[kind.value]}. Next:")
+    say(f"Template {kind.value}: {KINDS[kind.value]}.")
+    say("Next:")
     for line in (f"check {case}", f"steady {case}", f"report {default_folder(case)}"):
         say(f"  exugear {line}")
     say(f"Written: {case}")
