@@ -153,11 +153,23 @@ def _verdict(found: Mapping[str, Any], years: float, hours: float) -> str:
     return f"Life of {years:g} years, {hours:,.0f} h, {reached}{worst}"
 
 
+def _smallest_safeties(found: Mapping[str, Any]) -> str:
+    """Return the smallest safety factors of the gears: the parts with the largest damage may all be bearings."""
+    texts = []
+    for symbol, key in (("S_H", "contact_safety"), ("S_F", "root_safety")):
+        rated = [flank for flank in found["flanks"] if math.isfinite(_number(flank.get(key, math.nan)))]
+        if rated:
+            least = min(rated, key=lambda flank: float(flank[key]))
+            texts.append(f"{symbol} {float(least[key]):.2f} ({least['flank']})")
+    return f"Smallest {', '.join(texts)}. " if texts else ""
+
+
 def life_tables(found: Mapping[str, Any]) -> list[Table]:
     """Return the tables of all parts, and those of flanks, roots and bearings."""
     title = "Tooth flanks: largest contact stress, safety against pitting"
+    legend = f"{_smallest_safeties(found)}{PART_LEGEND}"
     return [
-        Table("Parts with the largest fatigue damage", _parts(found), PARTS, PART_LEGEND, noun="parts"),
+        Table("Parts with the largest fatigue damage", _parts(found), PARTS, legend, noun="parts"),
         Table(title, found["flanks"], FLANKS, CONTACT_LEGEND),
         Table("Tooth roots: largest stress, safety against breakage", found["flanks"], ROOTS, ROOT_LEGEND),
         Table("Bearings: rating life, static safety", found["bearings"], BEARINGS, BEARING_LEGEND),

@@ -9,7 +9,7 @@ KINDS = {
     "parallel": "two helical stages on three parallel shafts",
     "e-axle": "an electric machine with torque ripple and two helical stages, ratio 9",
     "planetary": "a planetary stage with three planets and a fixed ring gear",
-    "wind": "a planetary and two parallel stages, size of a 600 kW wind turbine",
+    "wind": "a planetary and two parallel stages, of a 600 kW wind turbine",
 }
 """Description of each kind."""
 
