@@ -97,7 +97,7 @@ class PassingPlanets:
         """
         assert family.planets is not None
         index = self._lines.index
-        step = family.planets.waves
+        step = family.planets.passing
         passing = np.zeros(index.shape[1], dtype=np.int64)
         passing[family.carrier] = step
         first = self._first_of_groups(family)
@@ -122,8 +122,9 @@ class PassingPlanets:
         turns = units[:, column].copy()
         units[:, column] = 0
         leading = units[np.arange(len(units)), np.argmax(units != 0, axis=1)]
-        turns = np.where(leading < 0, -turns, turns) % family.planets.waves
-        turns = np.where(leading == 0, np.minimum(turns, -turns % family.planets.waves), turns)
+        step = family.planets.passing
+        turns = np.where(leading < 0, -turns, turns) % step
+        turns = np.where(leading == 0, np.minimum(turns, -turns % step), turns)
         keys = np.column_stack([np.where(leading < 0, -1, 1)[:, None] * units, turns])
         return np.sort(np.unique(keys, axis=0, return_index=True)[1])
 

@@ -20,7 +20,7 @@ import scipy.linalg
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Mesh
 from exugear.steady.harmonics.linear_solvers import Elimination, elimination, solve_side_by_side
-from exugear.steady.mean_system.planet_sets import PlanetSet, SteadyError, phases_ahead, planet_sets
+from exugear.steady.mean_system.planet_sets import PlanetSet, SteadyError, planet_sets
 from exugear.steady.mean_system.rotating_frame import RotatingFrame
 from exugear.steady.mean_system.symmetric_carriers import SymmetricCarrier, symmetric_carrier
 from exugear.system.bearings.stiffness import load_stands_still, planet_supports, with_equal_planets
@@ -349,27 +349,17 @@ def _check(assembly: Assembly) -> None:
 
 
 def _check_ring(assembly: Assembly, elastic: Collection[str]) -> None:
-    """Refuse flexible ring gears whose meshes cannot be written as waves around one carrier of planets in phase."""
+    """Refuse flexible ring gears whose meshes cannot be written as waves around one carrier."""
     gearbox = assembly.gearbox
     travelling = [mesh for mesh in gearbox.meshes if mesh.gear in elastic and _has_sectors(gearbox, mesh)]
     if not travelling:
         return
     family = gearbox.body(travelling[0].gear).family
-    carrier = travelling[0].frame
     reason = ""
-    planets = [body.name for body in gearbox.bodies() if body.carrier == carrier]
-    in_set = [n for n, element in enumerate(assembly.elements) if {element.mesh.pinion, element.mesh.gear} & {*planets}]
-    families: dict[str, list[int]] = {}
-    for n in in_set:
-        families.setdefault(assembly.elements[n].mesh.family, []).append(n)
     if not all(gearbox.body(mesh.gear).fixed for mesh in travelling):
         reason = "rotates"
     elif len({mesh.family for mesh in travelling}) > 1:
         reason = "is one of several"
-    elif len(travelling) % 2 == 0:
-        reason = f"has {len(travelling)} planets, an even number"
-    elif any(phases_ahead(assembly, meshes) for meshes in families.values()):
-        reason = "has planets that mesh out of phase"
     if reason:
         raise SteadyError(
             f"bodies.{family}: the flexible ring gear {reason}, which the steady-state response cannot treat yet; set "
