@@ -9,7 +9,8 @@ waves act on each other by
 
     A(psi) = (1 / weight_w) sum_n s_w(theta_n) s_w'(theta_n) = sum_l A_l e^(i l psi),   l multiples of N,
 
-and a line of the response acts on those beside it at multiples of the planet passing frequency: by the mean stiffness,
+and with an even number of N/2, where the wave that alternates from planet to planet takes part. So a line of the
+response acts on those beside it at multiples of the planet passing frequency: by the mean stiffness,
 by the damper of the mesh, and by the harmonics of the stiffness as other waves do. Mean stiffness and damper couple a
 line with its neighbours strongly. Solved exactly for each line and its neighbours, they precondition the equation of
 all lines, which GMRES then solves in a few products, however many neighbours there are.

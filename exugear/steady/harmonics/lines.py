@@ -341,7 +341,7 @@ def with_rotations(
         for row in own:
             for turns in _all_turns(row[:meshes], modulators, most):
                 more.append(row.copy())
-                more[-1][meshes : meshes + len(turns)] += turns
+                more[-1][meshes : meshes + len(turns)] += np.array(turns, dtype=np.int64)
     # Rotations lead the search for common frequencies: meshes are whole multiples of them, however many teeth.
     lead = [*range(first, len(bases)), *range(meshes)]
     shared = _independent(bases[lead], whole=MOST_TEETH)
