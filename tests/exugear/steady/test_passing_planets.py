@@ -16,7 +16,7 @@ from exugear.system.build import elastic_arrays
 
 from ...optional_libraries import needs_meshio
 from ..cases.assembled import assembled
-from ..cases.ring import ring_content, write_rim
+from ..cases.ring import ring_content, two_stage_content, write_rim
 from ..cases.steady_runs import planets_apart_over_time, solver_of
 from .test_flexible_planetary_stage import by_order, rows_at
 
@@ -82,6 +82,19 @@ def test_a_run_that_starts_on_the_steady_state_of_all_planets_stays_there(solver
     error, forces = planets_apart_over_time(solver, speed, 0.8, 5e-6, 0.6)
     assert forces < 3e-3
     assert error < 2e-9
+
+
+@pytest.mark.validation
+def test_a_run_with_a_second_stage_behind_four_planets_stays_on_its_steady_state(grc, stiffness, tmp_path):
+    """RK4 at 1/200 kHz. The second stage has a rigid ring and three planets in phase; 1.4 um overall."""
+    content = two_stage_content(grc, tmp_path)
+    write_rim(tmp_path / "rim.vtu", oval=0.01)
+    gearbox = Gearbox.from_dict(content, str(tmp_path / "stages.toml")).varied(FOUR)
+    both = stiffness | {f"{name}_2": stiffness[name] for name in ("sun_planet", "ring_planet")}
+    solver = solver_of(assembled(gearbox, Choice("flexible"), both), RANGE, "parametric", 10)
+    error, forces = planets_apart_over_time(solver, 7.4, 0.8, 5e-6, 0.5)
+    assert forces < 3e-3
+    assert error < 6e-9
 
 
 @pytest.mark.validation
