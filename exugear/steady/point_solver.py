@@ -39,7 +39,7 @@ from exugear.steady.balance.response import (
 )
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
 from exugear.steady.harmonics.lines import LineSet, TorusSampling, joined, largest
-from exugear.steady.mean_system.mean_system import mean_system
+from exugear.steady.mean_system.mean_system import Steps, mean_system
 from exugear.steady.mean_system.mesh_places import DEFLECTION, POSITION
 from exugear.steady.mean_system.mesh_waves import FEWEST, mesh_waves
 from exugear.steady.mean_system.shaft_orders import shaft_orders, without_deviations
@@ -87,13 +87,14 @@ def harmonic_balance_model(
     harmonics: int | None = None,
     combinations: int = 3,
     method: Method = "parametric",
+    prepared: Steps | None = None,
 ) -> HarmonicBalanceModel:
     """Build the model of an assembly for input speeds (rad/s), orders as in `SteadySettings`; linear bearings.
 
     With contact loss, each state takes as many orders as it needs, starting with few. With the method `linear`,
-    stated loads have no sidebands.
+    stated loads have no sidebands. `prepared` is called as by `mean_system`.
     """
-    waves = mesh_waves(mean_system(without_deviations(assembly), speeds))
+    waves = mesh_waves(mean_system(without_deviations(assembly), speeds, prepared))
     usual = FEWEST if LAWS[assembly.mesh_model].loses_contact else waves.needed_harmonics()
     count = usual if harmonics is None else harmonics
     orders = shaft_orders(assembly, waves)

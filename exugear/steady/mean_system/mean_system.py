@@ -11,8 +11,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any, TypeVar
+from functools import cached_property, partial
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 import scipy.linalg
@@ -31,6 +31,8 @@ from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.display import ReprMixin
 
 Values = TypeVar("Values", Floats, Complexes)
+Steps: TypeAlias = Callable[[str, int, int], None]
+"""Called during a long preparation with its name, the number of finished steps, and the total; may raise to end it."""
 PLACE_STEP, RATE_STEP = 1e-6, 1e-3
 """Steps of central differences by u and u'; forces are all but linear in the latter."""
 ROWS_STEP = 1e-8
@@ -190,12 +192,13 @@ class MeanSystem(ReprMixin):
         return np.asarray(scipy.linalg.eigvals(matrix))
 
 
-def mean_system(assembly: Assembly, speeds: Floats) -> MeanSystem:
+def mean_system(assembly: Assembly, speeds: Floats, prepared: Steps | None = None) -> MeanSystem:
     """Linearise an assembly about its static states at speeds of the overall input.
 
     Parameters
     ----------
     speeds : rad/s; the system holds between the lowest and the highest
+    prepared : called with the steps of the linearisation
 
     Raises
     ------
@@ -219,16 +222,21 @@ def mean_system(assembly: Assembly, speeds: Floats) -> MeanSystem:
     # The static state of a gearbox with a flexible ring balances the mean over the carrier's places.
     places = frame.places if frame.has_elastic_ring else np.zeros(1)
     matrix = None
+    total = len(at) + (len(frame.places) - 1 if sets else 0)
+    report = partial(prepared or _unreported, "linearisation")
     for speed in at:
         u, torque = _static(frame, places, float(speed), drive, load, u, torque, matrix)
         damping, matrix = tangents(frame, 0.0, float(speed), u)
         rows.append((u, torque, damping, matrix))
+        report(len(rows), total)
     static, torques, dampings, stiffnesses = (np.array(values) for values in zip(*rows, strict=True))
     mass = _mass(frame, 0.0, static[1])
     variation = 0.0
     over_angle = None
     if sets:
-        changes, variation = _changes_over_places(frame, at, static, (mass, dampings[1], stiffnesses))
+        changes, variation = _changes_over_places(
+            frame, at, static, (mass, dampings[1], stiffnesses), lambda place: report(len(at) + place, total)
+        )
         mass = mass + changes[0].mean(axis=0)
         dampings = dampings + changes[1].mean(axis=0)
         stiffnesses = stiffnesses + changes[2].mean(axis=1)
@@ -249,6 +257,10 @@ def mean_system(assembly: Assembly, speeds: Floats) -> MeanSystem:
         variation,
         over_angle,
     )
+
+
+def _unreported(words: str, done: int, total: int) -> None:
+    """Report no progress."""
 
 
 def _with_equal_planets(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> tuple[Assembly, float]:
@@ -500,13 +512,18 @@ def _static(
 
 
 def _changes_over_places(
-    frame: RotatingFrame, speeds: Floats, static: Floats, here: tuple[Floats, Floats, Floats]
+    frame: RotatingFrame,
+    speeds: Floats,
+    static: Floats,
+    here: tuple[Floats, Floats, Floats],
+    report: Callable[[int], None],
 ) -> tuple[tuple[Floats, Floats, Floats], float]:
     """M and C (places, size, size) and K (3, places, size, size) at the carrier's places less those at the angle zero.
 
     These are given, and so are the static states (3, size) at the speeds. M and C are the same at all speeds. K is
     linear in the speed where dampers of teeth travel around a flexible ring gear, and else the same. The last result is
-    the largest change of K over the places, over K, without the meshes of a flexible ring gear.
+    the largest change of K over the places, over K, without the meshes of a flexible ring gear. `report` is called with
+    the number of each place.
 
     Raises
     ------
@@ -535,6 +552,7 @@ def _changes_over_places(
                 stiffnesses[n, place] = _stiffness(frame, psi, float(speeds[n]), static[n]) - stiffness[n]
             stiffnesses[1, place] = 0.5 * (stiffnesses[0, place] + stiffnesses[2, place])
         largest = max(largest, _checked_change(still, turned, most))
+        report(place)
     return (masses, dampings, stiffnesses), largest
 
 

@@ -11,7 +11,9 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.steady.balance import response as steady_balance
 from exugear.steady.balance.response import dissipated_and_given, signals
-from exugear.steady.mean_system.mean_system import unsuitable
+from exugear.steady.mean_system.mean_system import mean_system, unsuitable
+from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.steady.steady_response import response_of
 from exugear.system.build import elastic_arrays
 
 from ...optional_libraries import needs_meshio
@@ -135,3 +137,21 @@ def lines_of(grc, stiffness, folder, name, stiffer):
     force = "support_force lss_a x" if "out of phase" in name else "mesh_force sun_planet"
     names = [own.name for own in solver.model.signal_names]
     return {quantity: by_order(solver.model, lines[:, names.index(quantity)]) for quantity in ("overall_dte", force)}
+
+
+def test_a_computation_can_be_stopped_while_the_orders_beside_others_are_chosen(grc, stiffness, tmp_path):
+    """Every step of the preparation is reported; an exception at one of them, as of Ctrl-C, ends the computation."""
+    assembly = assembled(stage(grc, tmp_path, "four out of phase"), Choice("flexible"), stiffness)
+    seen = []
+
+    def stop(step, done, total):
+        seen.append((step, done, total))
+        if step.startswith("choice"):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        response_of(assembly, SteadySettings(SpeedRange(*RANGE, 2), harmonics=2, combinations=1), prepared=stop)
+    total = 3 + len(mean_system(assembly, np.array(RANGE)).frame.places) - 1
+    assert seen[:-1] == [("linearisation", done, total) for done in range(1, total + 1)]
+    assert seen[-1][0].startswith("choice of ")
+    assert seen[-1][1] <= seen[-1][2]
