@@ -304,7 +304,10 @@ class Project(ReprMixin):
         return modes
 
     def steady(
-        self, settings: SteadySettings | None = None, progress: Callable[[int, int], None] | None = None
+        self,
+        settings: SteadySettings | None = None,
+        progress: Callable[[int, int], None] | None = None,
+        prepared: Callable[[str, int, int], None] | None = None,
     ) -> xr.Dataset:
         """Return the steady-state response over speed, stored in `steady_path`; a matching stored one is reused.
 
@@ -313,6 +316,7 @@ class Project(ReprMixin):
         settings : speeds and method; by default `parametric`, up to the highest speed of the first load case and of
             ``[operation]``
         progress : called with the number of finished speeds and the total
+        prepared : called before the first speed with the name of a preparation, its finished steps and the total
         """
         # Kernels that a run does not need
         from exugear.steady.mean_system.mean_system import unsuitable
@@ -326,7 +330,7 @@ class Project(ReprMixin):
         choice = self.choice
         self.keep_case()
         with time_noted(self.folder, f"steady, {choice.variant}, {choice.inertias}, {choice.mesh_model}"):
-            return stored_or_computed(self.steady_path(settings), assembly, settings, progress)
+            return stored_or_computed(self.steady_path(settings), assembly, settings, progress, prepared)
 
     def measured(
         self,

@@ -112,13 +112,20 @@ class WatchedProject(Project):
             return super().duties()
 
     def steady(
-        self, settings: SteadySettings | None = None, progress: Callable[[int, int], None] | None = None
+        self,
+        settings: SteadySettings | None = None,
+        progress: Callable[[int, int], None] | None = None,
+        prepared: Callable[[str, int, int], None] | None = None,
     ) -> xr.Dataset:
         """Steady-state response over speed."""
         words = f"{self.choice.variant}: steady state"
         with self.bars.row() as row:
             row(words)
-            return super().steady(settings, lambda done, total: row(words, done, total))
+            return super().steady(
+                settings,
+                lambda done, total: row(words, done, total),
+                lambda step, done, total: row(f"{words}, {step}", done, total),
+            )
 
     def measured(
         self,

@@ -9,6 +9,8 @@ vibration.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -39,10 +41,10 @@ from exugear.steady.balance.response import (
 )
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
 from exugear.steady.harmonics.lines import LineSet, TorusSampling, joined, largest
-from exugear.steady.mean_system.mean_system import mean_system
+from exugear.steady.mean_system.mean_system import Steps, mean_system
 from exugear.steady.mean_system.mesh_places import DEFLECTION, POSITION
 from exugear.steady.mean_system.mesh_waves import FEWEST, mesh_waves
-from exugear.steady.mean_system.shaft_orders import shaft_orders, without_deviations
+from exugear.steady.mean_system.shaft_orders import any_shaft_orders, shaft_orders, without_deviations
 from exugear.steady.settings import Method
 from exugear.steady.settling import SettlingRun, SettlingSegment, cannot_settle
 from exugear.system.system import Assembly
@@ -87,19 +89,34 @@ def harmonic_balance_model(
     harmonics: int | None = None,
     combinations: int = 3,
     method: Method = "parametric",
+    prepared: Steps | None = None,
 ) -> HarmonicBalanceModel:
     """Build the model of an assembly for input speeds (rad/s), orders as in `SteadySettings`; linear bearings.
 
     With contact loss, each state takes as many orders as it needs, starting with few. With the method `linear`,
-    stated loads have no sidebands.
+    stated loads have no sidebands. Deviations and loads are taken where passing planets turn their bodies on average,
+    1e-3 rad at the sun in the planetary stage of the GRC. `prepared` is called as by `mean_system`.
     """
-    waves = mesh_waves(mean_system(without_deviations(assembly), speeds))
+    waves = mesh_waves(mean_system(without_deviations(assembly), speeds, prepared))
     usual = FEWEST if LAWS[assembly.mesh_model].loses_contact else waves.needed_harmonics()
     count = usual if harmonics is None else harmonics
-    orders = shaft_orders(assembly, waves)
+    moved = None
+    if waves.passing_ring is not None and any_shaft_orders(assembly):
+        moved = _passing_motion(HarmonicBalanceModel(waves, count, combinations))
+    orders = shaft_orders(assembly, waves, moved)
     if method == "linear":
         orders = orders.without_load_sidebands
     return HarmonicBalanceModel(waves, count, combinations, orders)
+
+
+def _passing_motion(model: HarmonicBalanceModel) -> Callable[[float], Floats]:
+    """Return the motion (size,) that passing planets cause at an angle of the input (rad), at the middle speed."""
+    speeds = model.system.speeds
+    speed = float(speeds[1] or speeds[2])
+    motion = parametric_response(model, model.at(speed)).motion.copy()
+    motion[model.lines.index[:, : len(model.waves.base_orders)].any(axis=1)] = 0.0
+    bases = math.copysign(1.0, speed) * model.lines.bases
+    return lambda psi: model.lines.values(motion, psi * bases[None])[0]
 
 
 @dataclass(frozen=True, eq=False)

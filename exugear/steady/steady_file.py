@@ -18,6 +18,7 @@ from exugear.gearbox.versions import STEADY
 from exugear.results.folder import modes_path
 from exugear.results.sound.over_speed import sound_variables, surface_words
 from exugear.steady.campbell import LAYOUT
+from exugear.steady.mean_system.mean_system import Steps
 from exugear.steady.mean_system.signals import (
     SURFACE_VELOCITY,
     Quantity,
@@ -308,6 +309,7 @@ def stored_or_computed(
     assembly: Assembly,
     settings: SteadySettings,
     progress: Callable[[int, int], None] | None = None,
+    prepared: Steps | None = None,
 ) -> xr.Dataset:
     """Read the response of an assembly at `path` if it exists and matches; else compute and write it.
 
@@ -323,6 +325,7 @@ def stored_or_computed(
             known=points.read(lambda arrays: SolvedPoints(**arrays)),
             progress=progress,
             keep=lambda solved: points.write(vars(solved)),
+            prepared=prepared,
         )
         store.write_dataset(to_dataset(response))
         points.discard()

@@ -37,6 +37,7 @@ from exugear.steady.damping_band import DampingBand, damping_band, no_band
 from exugear.steady.harmonics.branches import Scales, standing_peaks, trace
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
 from exugear.steady.harmonics.lines import LineSet
+from exugear.steady.mean_system.mean_system import Steps
 from exugear.steady.mean_system.mesh_places import DEFLECTION
 from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.mean_system.signals import SURFACE_VELOCITY, SignalName
@@ -309,6 +310,7 @@ def response_of(
     progress: Callable[[int, int], None] | None = None,
     keep: Kept | None = None,
     keep_every: float = 10.0,
+    prepared: Steps | None = None,
 ) -> SteadyResponse:
     """Steady response of an assembly.
 
@@ -319,13 +321,14 @@ def response_of(
     keep : callable, optional
         Called with the points that are solved, at times.
     keep_every : seconds between them
+    prepared : called before the first point with the steps of the preparation
     """
     check_speeds(assembly.gearbox, settings.speeds)
     check_law(assembly.mesh_model, settings.method)
     check_deviations(assembly.gearbox, settings.method)
     check_ring(assembly, settings.method)
     even = settings.speeds.values
-    model = harmonic_balance_model(assembly, even, settings.harmonics, settings.combinations, settings.method)
+    model = harmonic_balance_model(assembly, even, settings.harmonics, settings.combinations, settings.method, prepared)
     solver = PointSolver(model, settings.method)
     report = progress or (lambda done, total: None)
     tracks = _tracks(model, even)
@@ -338,7 +341,7 @@ def response_of(
     if model.waves.neighbours:
         every = model.lines.index
         judged = judged_speeds(float(even.min()), float(even.max()), [one.speed for one in found])
-        model, neglected = with_needed_neighbours(model, judged)
+        model, neglected = with_needed_neighbours(model, judged, prepared)
         solver = PointSolver(model, settings.method)
         found = tuple(replace(one, line=int(model.lines.find(every[one.line])[0])) for one in found)
     folds: tuple[float, ...] = ()

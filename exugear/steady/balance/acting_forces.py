@@ -20,7 +20,7 @@ def acting_forces(coupling: HarmonicCoupling, slow: HarmonicCoupling, deviations
     Parameters
     ----------
     coupling : of the forces with functions of the mesh cycles whose mean is zero
-    slow : of all meshes with signals at the orders of shafts, in one group
+    slow : of the meshes of each family with signals at the orders of shafts
     deviations : (n, m) of the meshes, with the same number of forces of each
     """
     lines = len(coupling.lines.index)
@@ -34,6 +34,8 @@ def acting_forces(coupling: HarmonicCoupling, slow: HarmonicCoupling, deviations
         own = slice(group.begin, group.begin + group.size)
         found[:, own] |= (has_neighbours | found[:, own].any(axis=1))[:, None]
     turned = found.copy()
-    line = np.repeat(np.arange(lines), np.diff(slow.terms.first[0]))
-    np.logical_or.at(turned, line, found[slow.terms.place])
+    for group, first in zip(slow.groups, slow.terms.first, strict=True):
+        line = np.repeat(np.arange(lines), np.diff(first))
+        own = slice(forces * group.begin, forces * (group.begin + group.size))
+        np.logical_or.at(turned[:, own], line, found[slow.terms.place[first[0] : first[-1]], own])
     return turned

@@ -332,16 +332,14 @@ class HarmonicBalanceModel:
         slow = self.shaft_orders
         sidebands = slow.sidebands + (slow.products if products else ())
         ring = self.ring
-        if ring is not None and ring.planets is not None:
-            most = waves.neighbours if neighbours is None else neighbours
-            lines = beside(lines, modulators, most)
-            most = min(most, SHAFT_NEIGHBOURS)
-            step = ring.planets.waves
-            carrier = ring.carrier - len(waves.base_orders)
-            sidebands = tuple(own.turned(carrier, step * n) for own in sidebands for n in range(-most, most + 1))
-        else:
+        meshes = len(waves.base_orders)
+        if ring is None or ring.planets is None:
             lines = beside(lines, modulators, 0) if waves.passing else modulated(lines, modulators)
-        return with_rotations(lines, slow.rotations, sidebands, len(waves.base_orders), reach.harmonics)
+            return with_rotations(lines, slow.rotations, sidebands, meshes, reach.harmonics)
+        most = waves.neighbours if neighbours is None else neighbours
+        lines = modulated(lines, modulators, ring.planets.in_steps(most))
+        most = ring.planets.in_steps(min(most, SHAFT_NEIGHBOURS))
+        return with_rotations(lines, slow.rotations, sidebands, meshes, reach.harmonics, modulators, most)
 
     @cached_property
     def beside_others(self) -> Booleans:
@@ -572,14 +570,30 @@ class HarmonicBalanceModel:
         )
 
     @cached_property
-    def slow_shifts(self) -> tuple[Integers, HarmonicCoupling]:
-        """Lines (q,) of the orders of shafts alone, and products of the meshes' deflections with signals of these."""
+    def slow_shifts(self) -> tuple[Integers, tuple[Integers, ...], HarmonicCoupling]:
+        """Find what moves the positions in the mesh cycles slowly, and products of the meshes' signals with it.
+
+        Returns
+        -------
+        lines : (q,) of the orders of shafts and of passing planets alone
+        places : (2 q, t) by family: harmonic of each of these lines, and of its conjugate, at the turns of products
+        products : of the signals of each family, as many as waves
+        """
         meshes = len(self.waves.base_orders)
         slow = ~self.lines.index[:, :meshes].any(axis=1) & self.lines.index[:, meshes:].any(axis=1)
         lines = np.flatnonzero(slow)
         multiples = self.lines.index[lines]
-        group = Group(0, len(self.waves.waves), np.concatenate([multiples, -multiples]))
-        return lines, HarmonicCoupling(self.lines, (group,))
+        multiples = np.concatenate([multiples, -multiples])
+        places = []
+        groups = []
+        for family in self.families:
+            turned = np.repeat(multiples[:, None], len(family.turns_of_products), axis=1)
+            if family.carrier >= 0:
+                turned[..., family.carrier] += family.turns_of_products
+            harmonics, place = np.unique(turned.reshape(-1, turned.shape[-1]), axis=0, return_inverse=True)
+            places.append(place.reshape(turned.shape[:2]))
+            groups.append(Group(family.first, family.count, harmonics))
+        return lines, tuple(places), HarmonicCoupling(self.lines, tuple(groups))
 
     def functions(self, spectra: Spectra) -> CycleFunctions:
         """Functions of the mesh cycles by their harmonics, which `coupling` takes at a speed of the input."""
@@ -654,7 +668,7 @@ class HarmonicBalanceModel:
         moving = self._ports["forces"].any(axis=(0, -1)).ravel()  # laws with fewer forces have none in their places
         acting = np.ones((len(self.lines.index), len(moving)), dtype=bool)
         if moving.size and not self.is_nonlinear and self.ring is None:
-            acting = acting_forces(self.coupling, self.slow_shifts[1], self._displacements)
+            acting = acting_forces(self.coupling, self.slow_shifts[2], self._displacements)
         stated = np.full(len(acting), bool(self._friction.size))
         if self.shaft_orders.sidebands:
             places = self._shaft_places.line[self.shaft_orders.reaction.any(axis=1)]

@@ -14,6 +14,7 @@ import numpy as np
 
 from exugear.steady.balance.excitation import HarmonicBalanceModel
 from exugear.steady.balance.response import parametric_response
+from exugear.steady.mean_system.mean_system import Steps
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.threads import side_by_side
 
@@ -36,8 +37,14 @@ def judged_speeds(low: float, high: float, crossings: Sequence[float]) -> Floats
     return np.unique(np.append(even[even != 0.0], crossings[:AT_CROSSINGS]))
 
 
-def with_needed_neighbours(model: HarmonicBalanceModel, speeds: Floats) -> tuple[HarmonicBalanceModel, float]:
+def with_needed_neighbours(
+    model: HarmonicBalanceModel, speeds: Floats, prepared: Steps | None = None
+) -> tuple[HarmonicBalanceModel, float]:
     """Leave out the neighbours of lines that hardly change the vibration in the other lines at some speeds (rad/s).
+
+    Parameters
+    ----------
+    prepared : called with the number of speeds that are solved with each choice of lines
 
     Returns
     -------
@@ -46,18 +53,28 @@ def with_needed_neighbours(model: HarmonicBalanceModel, speeds: Floats) -> tuple
     """
     assert model.ring is not None
     beside = model.beside_others & np.delete(model.lines.index, model.ring.carrier, axis=1).any(axis=1)
-    whole = side_by_side(lambda speed: _vibration(model, float(speed)), speeds)
+    whole = _vibrations(model, speeds, prepared)
     shares = np.array([np.linalg.norm(values[:, 1:], axis=1) for values in whole])
     shares /= np.linalg.norm(shares[:, 1:], axis=1)[:, None]
     few, changed = model, 0.0
     for carried in CARRIED:
         kept = ~beside | (shares.max(axis=0) > carried)
         few = model.of(kept)
-        chosen = side_by_side(partial(_vibration, few), map(float, speeds))
+        chosen = _vibrations(few, speeds, prepared)
         changed = max(_change(found, values[kept]) for found, values in zip(chosen, whole, strict=True))
         if changed < CHANGED:
             break
     return few, changed
+
+
+def _vibrations(model: HarmonicBalanceModel, speeds: Floats, prepared: Steps | None) -> list[Complexes]:
+    """Vibration at each of the speeds (rad/s), two at a time."""
+    found: list[Complexes] = []
+    while len(found) < len(speeds):
+        found += side_by_side(partial(_vibration, model), speeds[len(found) : len(found) + 2].tolist())
+        if prepared is not None:
+            prepared(f"choice of {len(model.lines.index)} orders", len(found), len(speeds))
+    return found
 
 
 def _vibration(model: HarmonicBalanceModel, speed: float) -> Complexes:

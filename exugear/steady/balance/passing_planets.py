@@ -9,7 +9,8 @@ waves act on each other by
 
     A(psi) = (1 / weight_w) sum_n s_w(theta_n) s_w'(theta_n) = sum_l A_l e^(i l psi),   l multiples of N,
 
-and a line of the response acts on those beside it at multiples of the planet passing frequency: by the mean stiffness,
+and with an even number of N/2, where the wave that alternates from planet to planet takes part. So a line of the
+response acts on those beside it at multiples of the planet passing frequency: by the mean stiffness,
 by the damper of the mesh, and by the harmonics of the stiffness as other waves do. Mean stiffness and damper couple a
 line with its neighbours strongly. Solved exactly for each line and its neighbours, they precondition the equation of
 all lines, which GMRES then solves in a few products, however many neighbours there are.
@@ -97,7 +98,7 @@ class PassingPlanets:
         """
         assert family.planets is not None
         index = self._lines.index
-        step = family.planets.waves
+        step = family.planets.passing
         passing = np.zeros(index.shape[1], dtype=np.int64)
         passing[family.carrier] = step
         first = self._first_of_groups(family)
@@ -122,8 +123,9 @@ class PassingPlanets:
         turns = units[:, column].copy()
         units[:, column] = 0
         leading = units[np.arange(len(units)), np.argmax(units != 0, axis=1)]
-        turns = np.where(leading < 0, -turns, turns) % family.planets.waves
-        turns = np.where(leading == 0, np.minimum(turns, -turns % family.planets.waves), turns)
+        step = family.planets.passing
+        turns = np.where(leading < 0, -turns, turns) % step
+        turns = np.where(leading == 0, np.minimum(turns, -turns % step), turns)
         keys = np.column_stack([np.where(leading < 0, -1, 1)[:, None] * units, turns])
         return np.sort(np.unique(keys, axis=0, return_index=True)[1])
 

@@ -26,7 +26,14 @@ from exugear.steady.balance.passing_planets import PassingPlanets
 from exugear.steady.harmonics.linear_solvers import solve_lines
 from exugear.steady.harmonics.lines import add_answered, flat
 from exugear.steady.mean_system.bearing_waves import TILTS
-from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, POSITION, CycleFunctions, MeshInterface
+from exugear.steady.mean_system.mesh_places import (
+    DEFLECTION,
+    MISALIGNMENT,
+    POSITION,
+    CycleFunctions,
+    MeshInterface,
+    wave_products,
+)
 from exugear.system.kernels.coordinates import BODY_SIZE
 from exugear.system.kernels.meshes import TILT_DAMPING, TILT_STIFFNESS
 from fe_ste.tools.arrays import Complexes, Floats
@@ -155,11 +162,9 @@ class MovingPositions:
         self._interface = interface
         self._shape = len(model.lines.index), *ports.forces.shape[:2]
         self._slopes = flat(model.slopes_over_cycle.at(ports, interface.speed))
-        waves = model.waves.waves
-        self._lines, self._coupling = model.slow_shifts
+        self._lines, self._places, self._coupling = model.slow_shifts
+        self._products = [wave_products(family, interface.speed) for family in model.families]
         self._rows = np.ascontiguousarray(ports.readings[: self._shape[1], POSITION].T)
-        # What two signals of a family of planets multiply to: each wave by the mean of the other.
-        self._mean = [next(n for n, own in enumerate(waves) if own.first == wave.first) for wave in waves]
 
     @cached_property
     def _pulls(self) -> Complexes | float:
@@ -187,11 +192,13 @@ class MovingPositions:
         along[..., DEFLECTION] = deflections - model.deviations(interface.speed)
         changes = model.coupling.of_flat(self._slopes, along.reshape(len(along), -1)).reshape(self._shape) + self._pulls
         shifts = np.concatenate([positions, positions.conj()])
-        products = np.zeros((len(shifts), self._shape[1], self._shape[1]), dtype=complex)
-        for n, at in enumerate(self._mean):
-            products[:, n, n] = shifts[:, at]
-            products[:, n, at] = shifts[:, n]
-        found[..., DEFLECTION] = self._coupling.of([products], changes[..., DEFLECTION])
+        functions = []
+        for group, places, products in zip(self._coupling.groups, self._places, self._products, strict=True):
+            own = shifts[:, group.begin : group.begin + products.shape[2]]
+            function = np.zeros((len(group.harmonics), group.size, group.size), dtype=complex)
+            np.add.at(function[..., : products.shape[3]], places, np.einsum("tvwx,qw->qtvx", products, own))
+            functions.append(function)
+        found[..., DEFLECTION] = self._coupling.of(functions, changes[..., DEFLECTION])
         return found
 
 

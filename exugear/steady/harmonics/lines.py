@@ -20,7 +20,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from typing import NamedTuple
@@ -154,6 +154,23 @@ class Modulator:
     step: int | None
     """What each multiple of the bases adds to the turns of its line, to be taken within half of `count` on either
     side; None where they follow no rule."""
+    passing: int = 0
+    """Turns that lie between lines where these are coupled to those beside them, however few they carry; 0 if not."""
+
+    def least_turns(self, line: Integers) -> tuple[int, ...]:
+        """Multiples of the rotation of a line (bases,) that is coupled to those beside it, the smallest by the rule.
+
+        Examples
+        --------
+        >>> four = Modulator(1.0, (0,), 4, 1, 2)
+        >>> four.least_turns(np.array([3, 1])), four.least_turns(np.array([2, 0])), four.least_turns(np.array([0, 1]))
+        ((-1,), (-2, 2), (0,))
+        """
+        half = self.count // 2
+        if self.step is None:
+            return tuple(range(-half, half + 1))
+        turns = (int(line[list(self.of)].sum()) * self.step + half) % self.count - half
+        return (turns, -turns) if 2 * turns == -self.count else (turns,)
 
     def turns(self, line: Integers) -> tuple[int, ...]:
         """Multiples of the rotation as sidebands of a line (bases,): by the rule; for a single base all of them.
@@ -164,6 +181,8 @@ class Modulator:
         >>> four.turns(np.array([3, 1])), four.turns(np.array([2, 0])), four.turns(np.array([0, 1]))
         ((-1,), (-2, -1, 0, 1, 2), (0,))
         """
+        if self.passing:
+            return self.least_turns(line)
         multiple = int(line[list(self.of)].sum())
         if not np.any(line[list(self.of)]):
             return (0,)
@@ -204,8 +223,12 @@ def line_set(orders: Sequence[float], harmonics: int, combinations: int = 0) -> 
     return _lines_of_rows(np.array([tuple(map(int, row)) for row in rows]), bases, _independent(bases))
 
 
-def modulated(lines: LineSet, modulators: Sequence[Modulator]) -> LineSet:
+def modulated(lines: LineSet, modulators: Sequence[Modulator], most: int = 0) -> LineSet:
     """Return lines with the sidebands caused by slow rotations, whose bases come after the others.
+
+    Parameters
+    ----------
+    most : maximum number of lines on either side that rotations couple to a line, the mean included
 
     Examples
     --------
@@ -215,11 +238,18 @@ def modulated(lines: LineSet, modulators: Sequence[Modulator]) -> LineSet:
     """
     orders = np.array([modulator.order for modulator in modulators])
     bases = np.append(lines.bases, orders)
-    rows: set[tuple[int, ...]] = set()
-    for line in lines.index[1:]:
-        for turns in itertools.product(*(modulator.turns(line) for modulator in modulators)):
-            rows.add(tuple(int(n) for n in (*line, *turns)))
+    rows = {(*line.tolist(), *turns) for line in lines.index for turns in _all_turns(line, modulators, most)}
     return _lines_of_rows(np.array(sorted(rows)), bases, _with_slow(lines.units, len(modulators)))
+
+
+def _all_turns(line: Integers, modulators: Sequence[Modulator], most: int) -> list[tuple[int, ...]]:
+    """Multiples of slow rotations (modulators,) beside a line (bases,), and of those up to `most` on either side."""
+    shifts = range(-most, most + 1) if any(modulator.passing for modulator in modulators) else (0,)
+    return [
+        tuple(turn + shift * modulator.passing for turn, modulator in zip(turns, modulators, strict=True))
+        for turns in itertools.product(*(modulator.turns(line) for modulator in modulators))
+        for shift in shifts
+    ]
 
 
 def beside(lines: LineSet, slow: Sequence[Modulator], most: int) -> LineSet:
@@ -268,20 +298,15 @@ class Sidebands:
     reach: int | None = None
     """Highest harmonic of the mesh frequency; None for all of a line set."""
 
-    def turned(self, rotation: int, turns: int) -> Sidebands:
-        """Return those that lie some turns of one of the rotations beside these.
-
-        Examples
-        --------
-        >>> Sidebands((0, 2), base=1).turned(0, -3).multiples
-        (-3, 2)
-        """
-        multiples = (*self.multiples[:rotation], self.multiples[rotation] + turns, *self.multiples[rotation + 1 :])
-        return replace(self, multiples=multiples)
-
 
 def with_rotations(
-    lines: LineSet, rotations: Sequence[Rotation], sidebands: Sequence[Sidebands], meshes: int, harmonics: int
+    lines: LineSet,
+    rotations: Sequence[Rotation],
+    sidebands: Sequence[Sidebands],
+    meshes: int,
+    harmonics: int,
+    modulators: Sequence[Modulator] = (),
+    most: int = 0,
 ) -> LineSet:
     """Return lines with the orders of rotations, whose bases come last.
 
@@ -289,6 +314,8 @@ def with_rotations(
     ----------
     meshes : number of the lines' bases that are meshes; other slow rotations follow them
     harmonics : of each mesh frequency whose sidebands are included
+    modulators : slow rotations behind the meshes that turn what stands beside a mesh, if any do
+    most : maximum number of lines on either side that rotations couple to a line
 
     Examples
     --------
@@ -311,7 +338,10 @@ def with_rotations(
         own[:, meshes:] = beside_mesh.multiples
         if beside_mesh.base is not None:
             own[:, beside_mesh.base] = np.arange(-reach, reach + 1)
-        more.append(own)
+        for row in own:
+            for turns in _all_turns(row[:meshes], modulators, most):
+                more.append(row.copy())
+                more[-1][meshes : meshes + len(turns)] += np.array(turns, dtype=np.int64)
     # Rotations lead the search for common frequencies: meshes are whole multiples of them, however many teeth.
     lead = [*range(first, len(bases)), *range(meshes)]
     shared = _independent(bases[lead], whole=MOST_TEETH)

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any, TypeVar
+from functools import cached_property, partial
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 import scipy.linalg
@@ -20,7 +20,7 @@ import scipy.linalg
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Mesh
 from exugear.steady.harmonics.linear_solvers import Batches, Elimination, elimination, solve_side_by_side
-from exugear.steady.mean_system.planet_sets import PlanetSet, SteadyError, phases_ahead, planet_sets
+from exugear.steady.mean_system.planet_sets import PlanetSet, SteadyError, planet_sets
 from exugear.steady.mean_system.rotating_frame import RotatingFrame
 from exugear.steady.mean_system.symmetric_carriers import SymmetricCarrier, symmetric_carrier
 from exugear.system.bearings.stiffness import load_stands_still, planet_supports, with_equal_planets
@@ -31,6 +31,8 @@ from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.display import ReprMixin
 
 Values = TypeVar("Values", Floats, Complexes)
+Steps: TypeAlias = Callable[[str, int, int], None]
+"""Called during a long preparation with its name, the number of finished steps, and the total; may raise to end it."""
 PLACE_STEP, RATE_STEP = 1e-6, 1e-3
 """Steps of central differences by u and u'; forces are all but linear in the latter."""
 ROWS_STEP = 1e-8
@@ -79,8 +81,8 @@ class MeanSystem(ReprMixin):
     """Largest change of stiffness over the carrier's places, over the stiffness: its mean is taken. What a flexible
     ring gear brings is left out of it: its meshes are waves around the carrier."""
     over_angle: tuple[Floats, Floats] | None = None
-    """(p, size, size) C and K less those at zero angle of the carrier, at p angles evenly spread over a planet passage;
-    None where they are the mean ones at any angle."""
+    """C (p, size, size) and K (3, p, size, size) less those at zero angle of the carrier, at p of its angles that are
+    evenly spread over the passing of a planet, or of two; None where they are the mean ones at any angle."""
 
     def _line(self) -> str:
         return f": {self.size} coordinates, {self.speeds.min():.4g} to {self.speeds.max():.4g} rad/s"
@@ -103,11 +105,11 @@ class MeanSystem(ReprMixin):
         """Systems with the carrier held at the angles of a planet passage; none without a flexible ring gear."""
         if self.over_angle is None:
             return
-        changes = self.over_angle
-        damping = self.damping - changes[0].mean(axis=0)
-        stiffness = self.stiffness - changes[1].mean(axis=0)
-        for more_damping, more_stiffness in zip(*changes, strict=True):
-            yield replace(self, damping=damping + more_damping, stiffness=stiffness + more_stiffness, over_angle=None)
+        dampings, stiffnesses = self.over_angle
+        damping = self.damping - dampings.mean(axis=0)
+        stiffness = self.stiffness - stiffnesses.mean(axis=1)
+        for place, more in enumerate(dampings):
+            yield replace(self, damping=damping + more, stiffness=stiffness + stiffnesses[:, place], over_angle=None)
 
     @cached_property
     def _parabola(self) -> Floats:
@@ -192,12 +194,13 @@ class MeanSystem(ReprMixin):
         return np.asarray(scipy.linalg.eigvals(matrix))
 
 
-def mean_system(assembly: Assembly, speeds: Floats) -> MeanSystem:
+def mean_system(assembly: Assembly, speeds: Floats, prepared: Steps | None = None) -> MeanSystem:
     """Linearise an assembly about its static states at speeds of the overall input.
 
     Parameters
     ----------
     speeds : rad/s; the system holds between the lowest and the highest
+    prepared : called with the steps of the linearisation
 
     Raises
     ------
@@ -221,19 +224,24 @@ def mean_system(assembly: Assembly, speeds: Floats) -> MeanSystem:
     # The static state of a gearbox with a flexible ring balances the mean over the carrier's places.
     places = frame.places if frame.has_elastic_ring else np.zeros(1)
     matrix = None
+    total = len(at) + (len(frame.places) - 1 if sets else 0)
+    report = partial(prepared or _unreported, "linearisation")
     for speed in at:
         u, torque = _static(frame, places, float(speed), drive, load, u, torque, matrix)
         damping, matrix = tangents(frame, 0.0, float(speed), u)
         rows.append((u, torque, damping, matrix))
+        report(len(rows), total)
     static, torques, dampings, stiffnesses = (np.array(values) for values in zip(*rows, strict=True))
     mass = _mass(frame, 0.0, static[1])
     variation = 0.0
     over_angle = None
     if sets:
-        changes, variation = _changes_over_places(frame, float(at[1]), static[1], (mass, dampings[1], stiffnesses[1]))
-        mass, dampings, stiffnesses = (
-            value + change.mean(axis=0) for value, change in zip((mass, dampings, stiffnesses), changes, strict=True)
+        changes, variation = _changes_over_places(
+            frame, at, static, (mass, dampings[1], stiffnesses), lambda place: report(len(at) + place, total)
         )
+        mass = mass + changes[0].mean(axis=0)
+        dampings = dampings + changes[1].mean(axis=0)
+        stiffnesses = stiffnesses + changes[2].mean(axis=1)
         if frame.has_elastic_ring:
             over_angle = changes[1], changes[2]
     pinned = assembly.spin[assembly.gearbox.case.overall.input]
@@ -251,6 +259,10 @@ def mean_system(assembly: Assembly, speeds: Floats) -> MeanSystem:
         variation,
         over_angle,
     )
+
+
+def _unreported(words: str, done: int, total: int) -> None:
+    """Report no progress."""
 
 
 def _with_equal_planets(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> tuple[Assembly, float]:
@@ -351,27 +363,17 @@ def _check(assembly: Assembly) -> None:
 
 
 def _check_ring(assembly: Assembly, elastic: Collection[str]) -> None:
-    """Refuse flexible ring gears whose meshes cannot be written as waves around one carrier of planets in phase."""
+    """Refuse flexible ring gears whose meshes cannot be written as waves around one carrier."""
     gearbox = assembly.gearbox
     travelling = [mesh for mesh in gearbox.meshes if mesh.gear in elastic and _has_sectors(gearbox, mesh)]
     if not travelling:
         return
     family = gearbox.body(travelling[0].gear).family
-    carrier = travelling[0].frame
     reason = ""
-    planets = [body.name for body in gearbox.bodies() if body.carrier == carrier]
-    in_set = [n for n, element in enumerate(assembly.elements) if {element.mesh.pinion, element.mesh.gear} & {*planets}]
-    families: dict[str, list[int]] = {}
-    for n in in_set:
-        families.setdefault(assembly.elements[n].mesh.family, []).append(n)
     if not all(gearbox.body(mesh.gear).fixed for mesh in travelling):
         reason = "rotates"
     elif len({mesh.family for mesh in travelling}) > 1:
         reason = "is one of several"
-    elif len(travelling) % 2 == 0:
-        reason = f"has {len(travelling)} planets, an even number"
-    elif any(phases_ahead(assembly, meshes) for meshes in families.values()):
-        reason = "has planets that mesh out of phase"
     if reason:
         raise SteadyError(
             f"bodies.{family}: the flexible ring gear {reason}, which the steady-state response cannot treat yet; set "
@@ -424,9 +426,12 @@ def tangents(frame: RotatingFrame, psi: float, speed: float, u: Floats) -> tuple
 
     The input turns at `speed` (rad/s).
     """
+    return _damping(frame, psi, speed, u), _stiffness(frame, psi, speed, u)
+
+
+def _damping(frame: RotatingFrame, psi: float, speed: float, u: Floats) -> Floats:
     here = np.tile(u, (len(u), 1))
-    damping = _slopes(lambda steps: _residuals(frame, psi, speed, here, steps), len(u), RATE_STEP)
-    return damping, _stiffness(frame, psi, speed, u)
+    return _slopes(lambda steps: _residuals(frame, psi, speed, here, steps), len(u), RATE_STEP)
 
 
 def _stiffness(frame: RotatingFrame, psi: float, speed: float, u: Floats) -> Floats:
@@ -509,11 +514,18 @@ def _static(
 
 
 def _changes_over_places(
-    frame: RotatingFrame, speed: float, u: Floats, here: tuple[Floats, Floats, Floats]
-) -> tuple[tuple[Floats, ...], float]:
-    """M, C and K, (places, size, size) each, at the carrier's places less those at the angle zero, which are given.
+    frame: RotatingFrame,
+    speeds: Floats,
+    static: Floats,
+    here: tuple[Floats, Floats, Floats],
+    report: Callable[[int], None],
+) -> tuple[tuple[Floats, Floats, Floats], float]:
+    """M and C (places, size, size) and K (3, places, size, size) at the carrier's places less those at the angle zero.
 
-    The last result is the largest change of K over the places, over K, without the meshes of a flexible ring gear.
+    These are given, and so are the static states (3, size) at the speeds. M and C are the same at all speeds. K is
+    linear in the speed where dampers of teeth travel around a flexible ring gear, and else the same. The last result is
+    the largest change of K over the places, over K, without the meshes of a flexible ring gear. `report` is called with
+    the number of each place.
 
     Raises
     ------
@@ -521,19 +533,29 @@ def _changes_over_places(
         The stiffness changes as the carrier turns.
     """
     places = frame.places
-    changes = tuple(np.zeros((len(places), *value.shape)) for value in here)
+    speed, u = float(speeds[1]), static[1]
+    mass, damping, stiffness = here
+    masses, dampings = np.zeros((2, len(places), *mass.shape))
+    stiffnesses = np.zeros((3, len(places), *mass.shape))
     largest = 0.0
     curved = any(element.is_curved for element in frame.assembly.elements)
     most = ROWS_VARIATION if frame.assembly.has_rows or curved else VARIATION
     without = frame.without_elastic_ring
-    still = here[2] if without is frame else _stiffness(without, 0.0, speed, u)
+    still = stiffness[1] if without is frame else _stiffness(without, 0.0, speed, u)
     for place, psi in enumerate(places[1:].tolist(), start=1):
-        there = (_mass(frame, psi, u), *tangents(frame, psi, speed, u))
-        turned = there[2] if without is frame else _stiffness(without, psi, speed, u)
+        masses[place] = _mass(frame, psi, u) - mass
+        dampings[place] = _damping(frame, psi, speed, u) - damping
+        if without is frame:
+            turned = _stiffness(frame, psi, speed, u)
+            stiffnesses[:, place] = turned - stiffness[1]
+        else:
+            turned = _stiffness(without, psi, speed, u)
+            for n in (0, 2):
+                stiffnesses[n, place] = _stiffness(frame, psi, float(speeds[n]), static[n]) - stiffness[n]
+            stiffnesses[1, place] = 0.5 * (stiffnesses[0, place] + stiffnesses[2, place])
         largest = max(largest, _checked_change(still, turned, most))
-        for change, value, other in zip(changes, here, there, strict=True):
-            change[place] = other - value
-    return changes, largest
+        report(place)
+    return (masses, dampings, stiffnesses), largest
 
 
 def _checked_change(here: Floats, there: Floats, most: float) -> float:

@@ -33,7 +33,7 @@ from exugear.steady.mean_system.mesh_waves import MeshWaves
 from exugear.steady.mean_system.planet_sets import PlanetSet
 from exugear.system.kernels.meshes import TILT_LEVER, TILT_REST, MeshArrays
 from exugear.system.kernels.table_law import NOMINAL_DEFLECTION, NOMINAL_DISTANCE, NOMINAL_MISALIGNMENT
-from fe_ste.tools.arrays import Booleans, Complexes, Floats
+from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
 
 TURNED = 5
 """Places around a carrier whose planets mesh in phase: exact for products of four waves."""
@@ -229,7 +229,21 @@ class Family:
         """Largest multiple of the carrier's angle in products of two shapes."""
         if self.carrier < 0 or self.planets is None:
             return 0
-        return 2 * (self.count // 2)
+        return 2 * self._highest(self.count)
+
+    @property
+    def turns_of_products(self) -> Integers:
+        """Multiples (t,) of the carrier's angle in the waves of a product of two signals at the planets."""
+        if self.carrier < 0 or self.planets is None:
+            return np.zeros(1, dtype=np.int64)
+        step = self.planets.passing
+        most = (self._highest(self.count) + 2 * self._highest(self.planets.waves)) // step
+        return step * np.arange(-most, most + 1)
+
+    def _highest(self, count: int) -> int:
+        """Find the highest wave number of the first waves."""
+        assert self.planets is not None
+        return max(m for _, m in self.planets.kinds(count))
 
 
 def families(waves: MeshWaves) -> tuple[Family, ...]:
@@ -255,6 +269,18 @@ def group_of(family: Family, harmonics: int, forces: int, bases: int) -> Group:
     if family.carrier >= 0:
         multiples[..., family.carrier] = turns
     return Group(forces * family.first, forces * family.count, multiples.reshape(-1, bases))
+
+
+def wave_products(family: Family, speed: float) -> Complexes:
+    """Find what the waves of two signals at the planets multiply to, (t, count, p, p) at `Family.turns_of_products`.
+
+    Both have the first p waves, as many as there are planets. Planets in phase count by their mean over a revolution.
+    """
+    turns = family.turns_of_products
+    there, norms = _shapes_over_turn(family, speed, 2 * int(turns[-1]) + 1)
+    first = there[..., : family.planets.waves if family.planets is not None and family.carrier >= 0 else None]
+    products = np.einsum("snv,snw,snx->svwx", there / norms, first, first)
+    return np.asarray(np.fft.fft(products, axis=0)[turns] / len(products))
 
 
 class CycleFunctions:
@@ -337,14 +363,19 @@ def _spectrum(spectra: Spectra, first: int, forces: int) -> Complexes:
 def _place_factors(family: Family, harmonics: int, ports: MeshInterface, speed: float) -> Complexes:
     """Factors (h + 1, turns, waves, waves) of the harmonics by all places, each as far ahead as in the static state."""
     samples = SAMPLED * family.turns if family.carrier >= 0 else 1
-    theta = 2.0 * math.pi * np.arange(samples) / samples
-    there = wave_shapes(family.planets, speed, theta if family.carrier >= 0 else None, family.count)
-    there = np.broadcast_to(there, (samples, *there.shape[-2:]))
-    norms = (there**2).sum(axis=-2, keepdims=True)
-    if family.planets is not None and family.carrier >= 0:
-        norms = family.planets.norms(family.count)
+    there, norms = _shapes_over_turn(family, speed, samples)
     back = np.swapaxes(there / norms, -1, -2)
     ahead = ports.positions[family.first] + np.array(family.ahead) + there @ ports.static[family.waves, POSITION]
     turned = np.exp(2j * math.pi * np.arange(harmonics + 1)[:, None, None] * ahead)
     between = (back * turned[:, :, None, :]) @ there
     return np.asarray(np.fft.fft(between, axis=1)[:, np.arange(-family.turns, family.turns + 1)] / samples)
+
+
+def _shapes_over_turn(family: Family, speed: float, samples: int) -> tuple[Floats, Floats]:
+    """Waves in all places (samples, places, count) over a turn of the carrier, and the mean sum of their squares."""
+    theta = 2.0 * math.pi * np.arange(samples) / samples
+    there = wave_shapes(family.planets, speed, theta if family.carrier >= 0 else None, family.count)
+    there = np.broadcast_to(there, (samples, *there.shape[-2:]))
+    if family.planets is not None and family.carrier >= 0:
+        return there, family.planets.norms(family.count)
+    return there, (there**2).sum(axis=-2, keepdims=True)

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -23,7 +23,7 @@ import numpy as np
 
 from exugear.steady.harmonics.lines import Modulator, fourier_coefficients
 from exugear.steady.mean_system.mean_system import MeanSystem
-from exugear.steady.mean_system.planet_sets import IN_PHASE, PlanetSet, phases_ahead
+from exugear.steady.mean_system.planet_sets import IN_PHASE, PlanetSet, phases_ahead, wave_kinds
 from exugear.steady.mean_system.rotating_frame import RotatingFrame
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.system.kernels.meshes import (
@@ -74,11 +74,8 @@ def wave_name(number: int, planets: int) -> str:
     >>> [wave_name(n, 4) for n in range(4)]
     ['mean', 'cosine', 'sine', 'alternating']
     """
-    if number < len(WAVES):
-        return WAVES[number]
-    if planets % 2 == 0 and number == planets - 1:
-        return "alternating"
-    return f"{WAVES[2 - number % 2]} {(number + 1) // 2}"
+    kind, m = wave_kinds(planets, number + 1)[number]
+    return kind if m < 2 or kind == "alternating" else f"{kind} {m}"
 
 
 @dataclass(frozen=True)
@@ -142,9 +139,24 @@ class MeshWaves:
                 bases.add(wave.base)
                 steps.add(_turns_per_cycle(wave, planets))
         return tuple(
-            (name, Modulator(abs(planets.ratio), tuple(sorted(bases)), planets.waves, *_one_of(steps)))
+            (
+                name,
+                Modulator(
+                    abs(planets.ratio),
+                    tuple(sorted(bases)),
+                    planets.waves,
+                    *_one_of(steps),
+                    planets.passing if planets is self.passing_ring else 0,
+                ),
+            )
             for name, (planets, bases, steps) in found.items()
         )
+
+    @cached_property
+    def passing_ring(self) -> PlanetSet | None:
+        """Planets that pass a flexible ring gear, whose meshes have more waves than there are planets; None without."""
+        of_waves = ((wave, self.planets(wave)) for wave in self.waves)
+        return next((planets for wave, planets in of_waves if planets and wave.wave >= planets.waves), None)
 
     def planets(self, wave: MeshWave) -> PlanetSet | None:
         """Planets of the meshes of a wave, None of a single mesh."""
@@ -195,9 +207,12 @@ class MeshWaves:
         """
         rates = np.zeros((len(self.waves),) * 2)
         for n, wave in enumerate(self.waves):
-            if wave.wave % 2 == 1 and n + 1 < len(self.waves) and self.waves[n + 1].wave == wave.wave + 1:
-                turns = (wave.wave + 1) // 2 * wave.carrier
-                rates[n, n + 1], rates[n + 1, n] = turns, -turns
+            planets = self.planets(wave)
+            if planets is None:
+                continue
+            kind, m = planets.kinds(wave.wave + 1)[-1]
+            if kind == "cosine":
+                rates[n, n + 1], rates[n + 1, n] = m * wave.carrier, -m * wave.carrier
         return rates
 
     def gradients(self, rows: Floats, speed: float) -> Floats:
@@ -339,7 +354,7 @@ class MeshWaves:
                 at += 1
                 continue
             count = sum(self.planets(wave) is planets and wave.first == meshes[0] for wave in self.waves)
-            shapes = planets.values(np.array(planets.ratio * psi), max(count, planets.waves))[:, :count]
+            shapes = planets.values(np.array(planets.ratio * psi), count)
             out[at : at + count] = np.tensordot(shapes / planets.norms(count), value, axes=(0, 0))
             at += count
         return out
@@ -371,18 +386,12 @@ def mesh_waves(system: MeanSystem, passing: int = 0, neighbours: int = NEIGHBOUR
             continue
         one_by_one = passing or any(planets is own for own in rings)
         ahead = phases_ahead(assembly, meshes) or (0.0,) * (len(meshes) if one_by_one else 0)
-        count = max(planets.waves if ahead else len(WAVES), 2 * frame.ring_waves(meshes[0]) + 1)
-        for number, weight in enumerate(planets.norms(max(count, planets.waves))[:count]):
+        count = max(planets.waves if ahead else len(WAVES), frame.waves_of_ring(meshes[0], planets))
+        for number, weight in enumerate(planets.norms(count)):
             label = f"{mesh.family} {wave_name(number, planets.waves)}" if number else mesh.family
             waves.append(MeshWave(label, mesh.family, *own, number, float(weight), base, sense, planets.ratio, ahead))
-    return MeshWaves(
-        system,
-        tuple(waves),
-        np.array(orders),
-        tuple(", ".join(name) for name in names),
-        passing,
-        neighbours if rings else 0,
-    )
+    found = MeshWaves(system, tuple(waves), np.array(orders), tuple(", ".join(name) for name in names), passing)
+    return found if found.passing_ring is None else replace(found, neighbours=neighbours)
 
 
 def mesh_groups(frame: RotatingFrame) -> tuple[tuple[tuple[int, ...], PlanetSet | None], ...]:
@@ -429,7 +438,7 @@ def _turns_per_cycle(wave: MeshWave, planets: PlanetSet) -> int | None:
     step = round(float(ahead[1]) * count)
     if np.abs((ahead - step * np.arange(count) / count + 0.5) % 1.0 - 0.5).max() > IN_PHASE:
         return None
-    return int(-step * wave.sense * math.copysign(1.0, wave.carrier))
+    return int(-step * wave.sense * math.copysign(1.0, wave.carrier)) % count
 
 
 def _one_of(steps: set[int | None]) -> tuple[int | None]:

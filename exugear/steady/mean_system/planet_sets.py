@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from exugear.system.bearings.stiffness import FEWEST, equally_spaced, planet_fam
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Floats
 
+WaveKind: TypeAlias = Literal["mean", "cosine", "sine", "alternating"]
 Jet: TypeAlias = tuple[Floats, Floats, Floats]
 """A function of the input's angle with two derivatives by it."""
 
@@ -42,27 +44,40 @@ class PlanetSet:
         """Number of planets, which is that of waves."""
         return len(self.names)
 
+    @property
+    def passing(self) -> int:
+        """Turns of the carrier that lie between the orders that the passing planets couple at a flexible ring gear.
+
+        Every planet that passes finds what the one before found. With an even number the alternating wave changes its
+        sign then: it is as before after two of them, and couples orders at half of the distance.
+        """
+        return self.waves // 2 if self.waves % 2 == 0 else self.waves
+
+    def in_steps(self, passages: int) -> int:
+        """Count the steps of `passing` that a number of planet passages has."""
+        return passages * self.waves // self.passing
+
+    def kinds(self, count: int | None = None) -> tuple[tuple[WaveKind, int], ...]:
+        """Kind and wave number of each wave, by default of as many as planets, which describe any motion of these.
+
+        A flexible ring gear has more, which follow.
+
+        Examples
+        --------
+        >>> PlanetSet(("a", "b", "c", "d"), "carrier", np.zeros(4), 1.0).kinds(6)[2:]
+        (('sine', 1), ('alternating', 2), ('cosine', 2), ('sine', 2))
+        """
+        return wave_kinds(self.waves, count or self.waves)
+
     def norms(self, count: int | None = None) -> Floats:
         """Mean over a turn of the carrier of the sum of each wave's squares over the planets, (count,)."""
-        found = np.full(count or self.waves, 0.5 * self.waves)
-        found[0] = self.waves
-        if self.waves % 2 == 0:
-            found[self.waves - 1 : self.waves] = self.waves
-        return found
+        paired = np.array([kind in ("cosine", "sine") for kind, _ in self.kinds(count)])
+        return np.where(paired, 0.5 * self.waves, float(self.waves))
 
     def values(self, turned: Floats, count: int | None = None) -> Floats:
-        """Waves at the planets (..., planets, count) where the carrier has turned by angles (...), rad.
-
-        By default as many as planets, which describe any motion of these; a flexible ring gear has more. The planets
-        are then odd in number.
-        """
+        """Waves at the planets (..., planets, count) where the carrier has turned by angles (...), rad."""
         theta = turned[..., None] + self.angles
-        found = [np.ones_like(theta)]
-        for m in range(1, ((count or self.waves) - 1) // 2 + 1):
-            found += [np.cos(m * theta), np.sin(m * theta)]
-        if self.waves % 2 == 0:
-            found.append(np.broadcast_to(np.where(np.arange(self.waves) % 2, -1.0, 1.0), theta.shape))
-        return np.stack(found, axis=-1)
+        return np.stack([self._wave(kind, m * theta) for kind, m in self.kinds(count)], axis=-1)
 
     def shapes(self, psi: float) -> Jet:
         """Waves at the planets (planets, waves), and two derivatives by the input's angle psi (rad).
@@ -70,21 +85,35 @@ class PlanetSet:
         The first three are the mean, the cosine and the sine.
         """
         theta = self.ratio * psi + self.angles
-        rate = self.ratio
-        value = [np.ones_like(theta)]
-        slope = [np.zeros_like(theta)]
-        bend = [np.zeros_like(theta)]
-        for m in range(1, (self.waves - 1) // 2 + 1):
-            c = np.cos(m * theta)
-            s = np.sin(m * theta)
-            value += [c, s]
-            slope += [-m * rate * s, m * rate * c]
-            bend += [-((m * rate) ** 2) * c, -((m * rate) ** 2) * s]
-        if self.waves % 2 == 0:
-            value.append(np.where(np.arange(self.waves) % 2, -1.0, 1.0))
-            slope.append(np.zeros_like(theta))
-            bend.append(np.zeros_like(theta))
+        value, slope, bend = [], [], []
+        for kind, m in self.kinds():
+            rate = m * self.ratio if kind in ("cosine", "sine") else 0.0
+            value.append(self._wave(kind, m * theta))
+            slope.append(rate * self._wave(kind, m * theta + 0.5 * math.pi))
+            bend.append(-(rate**2) * value[-1])
         return np.array(value).T, np.array(slope).T, np.array(bend).T
+
+    def _wave(self, kind: WaveKind, angle: Floats) -> Floats:
+        """Values of a wave at angles (..., planets), rad, which are those of the planets times the wave number."""
+        if kind == "mean":
+            return np.ones_like(angle)
+        if kind == "alternating":
+            return np.broadcast_to(np.where(np.arange(self.waves) % 2, -1.0, 1.0), angle.shape)
+        return np.asarray(np.cos(angle) if kind == "cosine" else np.sin(angle))
+
+
+def wave_kinds(planets: int, count: int) -> tuple[tuple[WaveKind, int], ...]:
+    """Kind and wave number of the first waves of a number of planets.
+
+    As many as planets describe any motion of these. The wave that changes its sign from planet to planet is its own
+    conjugate, and turns with the planets; the cosine and the sine of its number, which stand still, follow it.
+    """
+    found: list[tuple[WaveKind, int]] = [("mean", 0)]
+    for m in range(1, count // 2 + 1):
+        if 2 * m == planets:
+            found.append(("alternating", m))
+        found += [("cosine", m), ("sine", m)]
+    return tuple(found[:count])
 
 
 def planet_sets(assembly: Assembly) -> tuple[PlanetSet, ...]:

@@ -98,19 +98,30 @@ class RotatingFrame:
         body = self.assembly.elastic_bodies.get(gear.gear)
         return 0 if body is None else (len(body.sectors.get(gear.pair.gear.name, ())) - 1) // 2
 
+    def waves_of_ring(self, mesh: int, planets: PlanetSet) -> int:
+        """Count the waves of the deflections of planets with a flexible ring gear, of which a mesh is one; 0 of none.
+
+        The cosine and sine of half of an even number of planets are no motion of these, whose wave alternates.
+        """
+        highest = self.ring_waves(mesh)
+        alternating = planets.waves % 2 == 0
+        return max(planets.waves, 2 * highest + 1 + alternating) if highest else 0
+
     @cached_property
     def places(self) -> Floats:
         """Angles of the input (p,), rad, at which carriers are evenly spread from one planet's place to the next.
 
-        Over them and all planets products of two waves around a flexible ring gear have their exact mean.
+        Over them and all planets products of two waves around a flexible ring gear have their exact mean. With an even
+        number of planets they reach to the place after that: see `PlanetSet.passing`.
         """
-        count = PLACES
         for m, element in enumerate(self.assembly.elements):
             for planets in self.sets:
-                if element.mesh.pinion in planets.names:
-                    count = max(count, 2 * self.ring_waves(m) // planets.waves + 1)
+                if element.mesh.pinion in planets.names and (highest := self.ring_waves(m)):
+                    count = max(PLACES * planets.waves // planets.passing, 2 * highest // planets.passing + 1)
+                    passage = 2.0 * math.pi / abs(planets.passing * planets.ratio)
+                    return np.asarray(passage * np.arange(count) / count)
         passage = max(2.0 * math.pi / abs(planets.waves * planets.ratio) for planets in self.sets)
-        return np.asarray(passage * np.arange(count) / count)
+        return np.asarray(passage * np.arange(PLACES) / PLACES)
 
     @cached_property
     def without_elastic_ring(self) -> RotatingFrame:

@@ -19,9 +19,10 @@ n = h z + r of a gear with z teeth is its part r beside the cycle h of the mesh,
 
 from __future__ import annotations
 
+import cmath
 import itertools
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -53,6 +54,8 @@ NEGLECTED = 1e-2
 """Share of the root mean square of a mesh component's deviations in orders that are left out."""
 SAMPLES_PER_PIECE = 4
 """Samples of each cubic piece of a deviation for its Fourier coefficients; pieces are a fraction of a tooth."""
+PASSING_SAMPLES = 64
+"""Angles of the carrier over which the motion by passing planets has its mean."""
 REACH = 4
 """Harmonics of each mesh frequency whose sidebands a stated load has at most."""
 ABSENT = 1e-2
@@ -183,15 +186,22 @@ def without_deviations(assembly: Assembly) -> Assembly:
     return replace(assembly, elements=elements, meshes=assembly.meshes._replace(error_pieces=no_pieces))
 
 
-def shaft_orders(assembly: Assembly, waves: MeshWaves) -> ShaftOrders:
+def any_shaft_orders(assembly: Assembly) -> bool:
+    """Whether gears have deviations, or loads are stated over the angle of a body."""
+    return bool(assembly.meshes.error_pieces.any() or assembly.gearbox.varying_loads)
+
+
+def shaft_orders(assembly: Assembly, waves: MeshWaves, moved: Callable[[float], Floats] | None = None) -> ShaftOrders:
     """Find the deviations of an assembly's gears and the stated loads, and the orders that matter.
 
     Parameters
     ----------
     assembly : with deviations
     waves : mesh components of its averaged system without deviations
+    moved : motion (size,) about the static state, in the rotating frame, that passing planets cause at an angle of the
+        input, rad; by default none. Gears and loads are turned by its mean.
     """
-    series = _Series(assembly, waves)
+    series = _Series(assembly, waves, moved)
     for meshes, planets in waves.groups:
         series.add_family(meshes, planets)
     for n in range(len(assembly.gearbox.varying_loads)):
@@ -208,13 +218,14 @@ DEVIATION = -1
 class _Series:
     """Collects the terms of all families of meshes."""
 
-    def __init__(self, assembly: Assembly, waves: MeshWaves) -> None:
+    def __init__(self, assembly: Assembly, waves: MeshWaves, moved: Callable[[float], Floats] | None) -> None:
         self.assembly = assembly
+        self.moved = moved
         self.waves = waves
         self.frame = waves.system.frame
         speed = float(waves.system.speeds[1])
         self.speed = speed
-        self.still = self._state(0.0)
+        self.still = self._state(0.0, moves=False) + self._turned_by_passing
         self.cycles = [f"cycle of {name}" for name in waves.base_names]
         """Names of the bases of the meshes."""
         self.load = waves.mean_stiffness * (waves.values(assembly.meshes.deflection, speed) - waves.rest)
@@ -273,11 +284,22 @@ class _Series:
         wave = np.zeros(self.assembly.size, dtype=complex)
         wave[arrays.coordinate[entries]] = arrays.wave[entries] @ (0.5, 0.5j)
         wave = np.append(wave, 0.5 * self.reactions[number])
+        wave *= cmath.rect(1.0, load.order * float(self._turned_by_passing[arrays.turning[number]]))
         for key, turned in self._in_frame(load.body, load.order, wave):
             self._add(self.displacement, (number, key), np.zeros(len(self.waves.waves), dtype=complex))
             self._add(self.reaction, (number, key), turned)
             self.beside.append((key, None, None))
             self.beside += [(key, base, reach) for base, reach in enumerate(self._reaches) if reach]
+
+    @cached_property
+    def _turned_by_passing(self) -> Floats:
+        """Mean change of all coordinates by passing planets, behind them those of a flexible ring gear at planets."""
+        if self.moved is None:
+            return np.zeros(1)
+        turn = min(2.0 * math.pi / abs(planets.ratio) for planets in self.frame.sets)
+        angles = turn * np.arange(PASSING_SAMPLES) / PASSING_SAMPLES
+        changes = [self._state(float(psi)) - self._state(float(psi), moves=False) for psi in angles]
+        return np.asarray(np.mean(changes, axis=0))
 
     @cached_property
     def _reaches(self) -> list[int]:
@@ -365,9 +387,15 @@ class _Series:
         values = values * np.exp(1j * np.arange(len(values)) * angle)
         return [(n, complex(x)) for n, x in enumerate(values) if abs(x) > LEAST * np.abs(values).max()]
 
-    def _state(self, psi: float) -> Floats:
-        """Return static coordinates at an angle of the input (rad), behind them those of a flexible ring at planets."""
-        q = self.frame.state(psi, self.speed, self.waves.system.static_at(self.speed))[0]
+    def _state(self, psi: float, moves: bool = True) -> Floats:
+        """Return coordinates at an angle of the input (rad), behind them those of a flexible ring gear at planets.
+
+        They are static, and with `moves` as passing planets change them.
+        """
+        static = self.waves.system.static_at(self.speed)
+        if moves and self.moved is not None:
+            static = static + self.moved(psi)
+        q = self.frame.state(psi, self.speed, static)[0]
         return self.assembly.with_travelling(q, np.zeros_like(q))[0]
 
     def _row(self, angles: list[tuple[int, float]], psi: float) -> Floats:

@@ -97,7 +97,7 @@ def gear_load_rows(waves: MeshWaves) -> tuple[Floats, Floats, Floats]:
             friction = zip(sliding, -element.friction_rows, strict=True)
             for part, rows in ((along, force), (turning, element.misalignment), *friction):
                 for (body, gear), row in zip(_ends(element), rows.reshape(2, BODY_SIZE), strict=True):
-                    if gear in gears and _stands(assembly, body):
+                    if gear in gears and _stands(assembly, body) and not _has_sectors(assembly, body, gear):
                         first = BODY_SIZE * gears.index(gear)
                         part[number, first : first + BODY_SIZE] -= share * _about_gear(assembly, body, gear, row)
     return along, turning, np.stack(sliding, axis=1)

@@ -115,3 +115,25 @@ def drum_content(grc: Gearbox, folder: Path) -> dict[str, Any]:
         "solid": {"file": "drum.vtu", "band_Hz": 1000.0, "seats": seats},
     }
     return content
+
+
+def two_stage_content(grc: Gearbox, folder: Path) -> dict[str, Any]:
+    """Content of a gearbox file with that stage, whose sun drives the carrier of a second one with a rigid ring."""
+    content = ring_content(grc, folder)
+    bodies = content["bodies"]
+    for name in ("carrier", "planet", "lss"):
+        bodies[f"{name}_2"] = copy.deepcopy(bodies[name])
+    bodies["planet_2"]["carrier"] = "carrier_2"
+    bodies["housing_2"] = {name: bodies["housing"][name] for name in ("fixed", "axis_position_mm", "gears_z_mm")}
+    for name, bearing in list(content["bearings"].items()):
+        ends = {end: f"{bearing[end]}_2" for end in ("body", "on") if end in bearing}
+        content["bearings"][f"{name}_2"] = copy.deepcopy(bearing) | ends
+    content["meshes"] |= {
+        "sun_planet_2": {"pair": "sun_planet", "pinion_body": "lss_2", "gear_body": "planet_2"},
+        "ring_planet_2": {"pair": "ring_planet", "pinion_body": "planet_2", "gear_body": "housing_2"},
+    }
+    content["couplings"] = {"middle": {"bodies": ["lss", "carrier_2"], "stiffness_N_m_per_rad": 2e7}}
+    content["overall"] = {"input": "carrier", "output": "lss_2", "output_gear": "sun"}
+    content["static_load"] = {"torques_N_m": {"carrier": 240e3}, "locked": ["lss_2"]}
+    content["load_cases"] = {"run_up": {"torques_N_m": {"carrier": 240e3, "lss_2": -6e3}}}
+    return content

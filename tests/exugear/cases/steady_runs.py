@@ -100,6 +100,24 @@ def run_from(model, response, duration, step, torque, assembly=None, name="overa
 
     The overall transmission error is a length here.
     """
+    time, signals_over_time, angle, observer = whole_run(model, response, duration, step, torque, assembly)
+    column = column_of(observer, name)
+    factor = 1.0 if " " in name else observer.layout.radius
+    return time, factor * signals_over_time[:, column], angle
+
+
+def column_of(observer, name):
+    """Column of a signal of one part, such as `mesh_force ring_planet_1`."""
+    kind, _, part = name.partition(" ")
+    column = observer.layout[kind].start
+    if part:
+        (dimension,) = next(own.dimensions[1:] for own in observer.layout.signals if own.name == kind)
+        column += observer.layout.names[dimension].index(part)
+    return column
+
+
+def whole_run(model, response, duration, step, torque, assembly=None):
+    """Instants, all signals, and angle of the input of a run in time that starts on a response; its observer."""
     interface = response.interface
     system, motion = model.system, response.motion
     assembly = assembly or model.waves.assembly
@@ -110,12 +128,6 @@ def run_from(model, response, duration, step, torque, assembly=None, name="overa
     loads = LoadTable({**load.torques_N_m, load.locked[0]: torque}, varying=assembly.varying_loads)
     run = CompiledSystem(assembly, q, v, loads, step)
     observer = Observer(assembly, loads)
-    kind, _, part = name.partition(" ")
-    column = observer.layout[kind].start
-    if part:
-        (dimension,) = next(own.dimensions[1:] for own in observer.layout.signals if own.name == kind)
-        column += observer.layout.names[dimension].index(part)
-    factor = 1.0 if part else observer.layout.radius
     steps, every = round(duration / step), 8
     time, signal, angle = [], [], []
     for first in range(0, steps, 8000):
@@ -124,9 +136,9 @@ def run_from(model, response, duration, step, torque, assembly=None, name="overa
         assert run.advance(first, states, rates) == 8000
         time.append(step * (first + np.arange(every, 8001, every)))
         states, rates = (np.ascontiguousarray(values[every - 1 :: every]) for values in (states, rates))
-        signal.append(factor * observer.observe(time[-1], states, rates)[0][:, column])
+        signal.append(observer.observe(time[-1], states, rates)[0])
         angle.append(states[:, system.pinned])
-    return tuple(np.concatenate(values) for values in (time, signal, angle))
+    return (*(np.concatenate(values) for values in (time, signal, angle)), observer)
 
 
 def fitted(solver, response, duration, step, last, assembly=None, name="overall_dte_angle"):
@@ -172,15 +184,45 @@ def apart_over_time(solver, speed, duration, step, last, assembly=None, name="ov
     response = solver.response(speed)
     time, found, angle = run_from(model, response, duration, step, drive_of(model, response), assembly, name)
     late = time > duration - last
-    sense = np.copysign(1.0, speed)
-    mean, start = np.polyfit(time[late], angle[late], 1)
-    for _ in range(2):  # without what slow orders of the vibration add to the angle
-        angles = np.outer(sense * (mean * time[late] + start), model.lines.bases)
-        own = model.lines.values(response.motion[:, [model.system.pinned]], angles)[:, 0]
-        mean, start = np.polyfit(time[late], angle[late] - own, 1)
+    mean, rolled = rolling(model, response, time[late], angle[late])
     column = 0 if name == "overall_dte_angle" else [own.name for own in model.signal_names].index(name)
-    lines = signals(model, solver.response(float(mean)))[:, column]
-    angles = np.outer(sense * (mean * time[late] + start), model.lines.bases)
-    known = model.lines.values(lines, angles)
+    lines = signals(model, solver.response(mean))[:, column]
+    known = model.lines.values(lines, np.outer(np.copysign(1.0, speed) * rolled, model.lines.bases))
     change = found[late] - known
     return float(np.std(change) / np.std(known))
+
+
+def rolling(model, response, time, angle):
+    """Mean speed of a run, and the angle of the input at it: without what slow orders of the vibration add."""
+    mean, start = np.polyfit(time, angle, 1)
+    for _ in range(2):
+        angles = np.outer(np.copysign(1.0, mean) * (mean * time + start), model.lines.bases)
+        own = model.lines.values(response.motion[:, [model.system.pinned]], angles)[:, 0]
+        mean, start = np.polyfit(time, angle - own, 1)
+    return float(mean), mean * time + start
+
+
+def planets_apart_over_time(solver, speed, duration, step, last):
+    """Differences of signals over time between response and run: of the overall transmission error, m, and of forces.
+
+    The forces are those of the meshes of all planets, over the vibration of each.
+    """
+    model = solver.model
+    response = solver.response(speed)
+    time, found, angle, observer = whole_run(model, response, duration, step, drive_of(model, response))
+    late = time > duration - last
+    mean, rolled = rolling(model, response, time[late], angle[late])
+    lines = signals(model, solver.response(mean))
+    names = [own.name for own in model.signal_names]
+    angles = np.outer(np.copysign(1.0, speed) * rolled, model.lines.bases)
+    overall = observer.layout.radius * found[late, column_of(observer, "overall_dte_angle")]
+    forces = []
+    for meshes, planets in model.waves.groups:
+        waves = [wave for wave in (model.waves.waves[n] for n in model.waves.force_waves) if wave.first == meshes[0]]
+        columns = [names.index(f"mesh_force {wave.name}") for wave in waves]
+        shapes = planets.values(planets.ratio * rolled)
+        known = np.einsum("snw,sw->sn", shapes, model.lines.values(lines[:, columns], angles))
+        for place, mesh in enumerate(meshes):
+            own = found[late, column_of(observer, f"mesh_force {model.waves.assembly.elements[mesh].mesh.name}")]
+            forces.append(float(np.std(own - known[:, place]) / np.std(own)))
+    return float(np.std(overall - model.lines.values(lines[:, [0]], angles)[:, 0])), max(forces)
