@@ -295,7 +295,7 @@ class _Series:
     def _turned_by_passing(self) -> Floats:
         """Mean change of all coordinates by passing planets, behind them those of a flexible ring gear at planets."""
         if self.moved is None:
-            return np.zeros(1)
+            return np.zeros_like(self._state(0.0))
         turn = min(2.0 * math.pi / abs(planets.ratio) for planets in self.frame.sets)
         angles = turn * np.arange(PASSING_SAMPLES) / PASSING_SAMPLES
         changes = [self._state(float(psi)) - self._state(float(psi), moves=False) for psi in angles]

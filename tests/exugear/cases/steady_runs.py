@@ -203,9 +203,13 @@ def rolling(model, response, time, angle):
 
 
 def planets_apart_over_time(solver, speed, duration, step, last):
-    """Differences of signals over time between response and run: of the overall transmission error, m, and of forces.
+    """Differences of signals over time between response and run, as root mean squares without the mean.
 
-    The forces are those of the meshes of all planets, over the vibration of each.
+    Returns
+    -------
+    error : of the overall transmission error, m
+    overall : vibration of the overall transmission error, m
+    forces : largest of those of the forces of the meshes of all planets, over the vibration of each
     """
     model = solver.model
     response = solver.response(speed)
@@ -225,4 +229,5 @@ def planets_apart_over_time(solver, speed, duration, step, last):
         for place, mesh in enumerate(meshes):
             own = found[late, column_of(observer, f"mesh_force {model.waves.assembly.elements[mesh].mesh.name}")]
             forces.append(float(np.std(own - known[:, place]) / np.std(own)))
-    return float(np.std(overall - model.lines.values(lines[:, [0]], angles)[:, 0])), max(forces)
+    error = float(np.std(overall - model.lines.values(lines[:, [0]], angles)[:, 0]))
+    return error, float(np.std(overall)), max(forces)

@@ -173,17 +173,14 @@ def excited(grc, stiffness, folder, changes, choice="flexible"):
     ("kind", "most"),
     [
         ("run-out of the sun", 1e-3),
-        ("run-out of a planet", 2e-3),
-        ("pitch of the ring", 8e-3),
-        ("torque on the sun shaft", 2e-3),
+        ("run-out of a planet", 1e-3),
+        ("pitch of the ring", 2e-3),
+        ("torque on the sun shaft", 1e-3),
         ("torque on the carrier", 2e-3),
     ],
 )
 def test_a_run_with_orders_of_shafts_stays_on_its_steady_state(grc, stiffness, folder, kind, most):
-    """Overall transmission error over the last 0.5 of 0.6 s, RK4 at 1/200 kHz.
-
-    With rigid bodies the pitch of the ring is within 1.6e-3, as the speed of the teeth is of first order there, too.
-    """
+    """Overall transmission error over the last 0.5 of 0.6 s, RK4 at 1/200 kHz."""
     assembly = excited(grc, stiffness, folder, SHAFT_EXCITATIONS[kind])
     solver = solver_of(assembly, RANGE, "parametric", 6)
     assert apart_over_time(solver, SPEED, 0.6, 5e-6, 0.5, assembly) < most
