@@ -210,8 +210,8 @@ def test_an_unstable_response_ends_with_code_1_and_says_so(case, monkeypatch):
 
     kept = Project.steady
 
-    def unstable(self, settings, progress):
-        return kept(self, settings, progress).assign_attrs(growth_rate=221.0)
+    def unstable(self, settings, *progress):
+        return kept(self, settings, *progress).assign_attrs(growth_rate=221.0)
 
     monkeypatch.setattr(Project, "steady", unstable)
     outcome = steady(case, "--variant", "rigid", "--speeds", "10:50", "--points", "5")
@@ -225,8 +225,8 @@ def test_a_branch_that_is_not_whole_ends_with_code_1_and_says_where(case, monkey
 
     kept, words = Project.steady, "the continuation ends at 12.5 rpm after 2000 points, before"
 
-    def ended(self, settings, progress):
-        return kept(self, settings, progress).assign_attrs(branch_ended=words, growth_rate=-1.0)
+    def ended(self, settings, *progress):
+        return kept(self, settings, *progress).assign_attrs(branch_ended=words, growth_rate=-1.0)
 
     monkeypatch.setattr(Project, "steady", ended)
     outcome = steady(case, "--variant", "bushing", "--speeds", "1400:1500", "--points", "3", "--json")
