@@ -215,7 +215,10 @@ def test_a_mode_is_chosen_in_the_table_and_in_the_diagram(view: EditView) -> Non
 
 
 @pytest.mark.parametrize("name", ["Tables", "Design changes"])
-def test_long_work_shows_progress_and_is_cancelled(view: EditView, case: Path, name: str) -> None:
+def test_long_work_shows_progress_and_is_cancelled(browser: Any, address: str, case: Path, name: str) -> None:
+    case.write_text(f"{PAIR}\n[ste]\npositions = 1000\n", encoding="utf-8")  # half a minute on a fast machine
+    view = EditView(browser, address)
+    view.current()
     view.page.get_by_role("button", name=name).click()
     view.page.wait_for_selector("#cancel:visible")
     assert view.soon(lambda: view.page.evaluate("document.getElementById('progress').value") > 0)
@@ -228,6 +231,7 @@ def test_long_work_shows_progress_and_is_cancelled(view: EditView, case: Path, n
     assert view.page.locator("#stored .old").count() == 0
     assert "Report" not in view.text("#stored")
     assert view.errors == []
+    view.page.context.close()
 
 
 @pytest.mark.long
