@@ -220,7 +220,7 @@ def batches_of(acting: Booleans, own: Booleans) -> Batches:
     --------
     >>> found = batches_of(np.arange(9)[:, None] == [0, 3], np.zeros(9, dtype=bool))
     >>> found.lines.tolist(), found.columns.tolist(), found.first.tolist()
-    ([1, 2, 4, 5, 6, 7, 8, 0, 3], [0, 1], [0, 1, 2])
+    ([1, 2, 4, 5, 6, 7, 8, 3, 0], [1, 0], [0, 1, 2])
     """
     keys = np.column_stack([acting, own])
     lines = np.lexsort(keys.T[::-1])
