@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from importlib.metadata import Distribution, PackageNotFoundError, distribution
+from pathlib import Path
 
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
@@ -45,7 +46,8 @@ def closure(wanted: Iterable[Requirement]) -> set[str]:
 def megabytes(names: Iterable[str]) -> float:
     """Return the size of the files of some packages, MB."""
     files = (file for name in names for file in distribution(name).files or ())
-    return sum(path.stat().st_size for file in files if (path := file.locate()).is_file()) / 1e6  # type: ignore[attr-defined]
+    paths = (Path(str(file.locate())) for file in files)
+    return sum(path.stat().st_size for path in paths if path.is_file()) / 1e6
 
 
 def main() -> None:
