@@ -296,7 +296,8 @@ class PointSolver:
             if begin is not None:
                 motion = PERTURBATION * begin.response.motion
             rows = interface.ports.readings[:, DEFLECTION]
-            run = SettlingRun(model.system, model.lines, rows, model.waves.base_orders, speed, motion)
+            bases = model.waves.base_orders
+            run = SettlingRun(model.system, model.lines, rows, bases, speed, motion, model.assembly_in_time)
             for _ in range(LEGS):
                 leg = run.leg()
                 if leg is None:
@@ -436,7 +437,7 @@ def _lacking(balance: HarmonicResidual, readings: Complexes) -> LineSet | None:
     size = float(np.linalg.norm(readings[1:, :, DEFLECTION]))
     ahead = HarmonicResidual(whole, whole.at(balance.interface.speed), whole.sampling)
     start = readings_in(balance.model, readings, whole)
-    if whole.shaft_orders.sidebands:
+    if whole.shaft_orders.has_loads:
         ahead = ahead.with_turned_loads(start)
     excess, tangent, _ = ahead.forces(start)
     missing = tangent.alone(ahead.answer(excess) + ahead.static - start)

@@ -176,23 +176,18 @@ def check_law(name: str, method: Method) -> None:
         )
 
 
-def check_deviations(gearbox: Gearbox, method: Method) -> None:
-    """Refuse deviations of gears, and trains without meshes, with the method that evaluates the mesh models in time.
+def check_meshes(gearbox: Gearbox, method: Method) -> None:
+    """Refuse trains without meshes with the method that evaluates the mesh models in time.
 
     Raises
     ------
     SteadyError
-        The gearbox file has deviations or no meshes, and the method is ``nonlinear``.
+        The gearbox file has no meshes, and the method is ``nonlinear``.
     """
     if not gearbox.meshes and method == "nonlinear":
         raise SteadyError(
             "meshes: the train has none whose forces the method nonlinear could evaluate; use --method parametric, or "
             "exugear run"
-        )
-    if gearbox.deviations and method == "nonlinear":
-        raise SteadyError(
-            "deviations: the method nonlinear does not include deviations of gears; use --method parametric with "
-            "--mesh-model line_of_action, or exugear run"
         )
 
 

@@ -17,6 +17,7 @@ from exugear.steady.mean_system.planet_sets import PlanetSet
 from exugear.steady.mean_system.rotating_frame import RotatingFrame
 from exugear.system.kernels.coordinates import TILT
 from exugear.system.loads import Drive, LoadTable
+from exugear.system.system import Assembly
 from exugear.transient.compiled.solver import CompiledSystem, unsupported_reason
 from fe_ste.tools.arrays import Complexes, Floats, Integers
 
@@ -126,14 +127,22 @@ class SettlingRun:
     bases : (bases,) mesh frequencies over the frequency of the input's turns
     speed : of the overall input, rad/s
     motion : (n, size) lines of the motion to start from, in the rotating frame about the static state
+    assembly : in motion; by default that of the averaged system, whose gears have no deviations
     """
 
     def __init__(
-        self, system: MeanSystem, lines: LineSet, rows: Floats, bases: Floats, speed: float, motion: Complexes
+        self,
+        system: MeanSystem,
+        lines: LineSet,
+        rows: Floats,
+        bases: Floats,
+        speed: float,
+        motion: Complexes,
+        assembly: Assembly | None = None,
     ) -> None:
         self._system, self._lines, self._rows = system, lines, rows
         frame = system.frame
-        assembly = system.frame.assembly
+        self._assembly = assembly = assembly or frame.assembly
         slowest = float(bases.min()) * abs(speed)
         fastest = float(bases.max()) * abs(speed)
         rate = float(np.abs(system.eigenvalues(speed)).max())
@@ -155,7 +164,7 @@ class SettlingRun:
 
     def leg(self) -> SettlingSegment | None:
         """Run on, and fit the lines over the second half; None where the motion is not finite."""
-        assembly = self._system.frame.assembly
+        assembly = self._assembly
         pinned = self._system.pinned
         q, v = self._state
         rate = self._held * self._slowest

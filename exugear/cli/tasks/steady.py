@@ -31,8 +31,8 @@ from exugear.steady.settings import (
     Method,
     SpeedRange,
     SteadySettings,
-    check_deviations,
     check_law,
+    check_meshes,
     check_speeds,
     usual_speeds,
 )
@@ -67,7 +67,7 @@ def settings_of_options(
 ) -> SteadySettings:
     """Return the settings that the options state; raise an error if they are invalid for the project."""
     check_law(project.choice.mesh_model, method)
-    check_deviations(project.gearbox, method)
+    check_meshes(project.gearbox, method)
     check_speeds(project.gearbox, speeds)
     return SteadySettings(speeds, method, harmonics, branches=branches)
 

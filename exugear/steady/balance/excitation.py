@@ -69,6 +69,7 @@ from exugear.steady.mean_system.standing_loads import gear_load_rows, moment_sup
 from exugear.steady.mean_system.tooth_friction import friction_parts, tooth_friction
 from exugear.system.kernels.coordinates import BODY_SIZE
 from exugear.system.kernels.meshes import SPIN_1
+from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
 
@@ -441,6 +442,14 @@ class HarmonicBalanceModel:
     def system(self) -> MeanSystem:
         """The averaged system."""
         return self.waves.system
+
+    @property
+    def assembly_in_time(self) -> Assembly:
+        """The assembly of the averaged system for runs in time, in which gears have their deviations."""
+        assembly = self.system.frame.assembly
+        if not self.shaft_orders.error_pieces.any():
+            return assembly
+        return replace(assembly, meshes=assembly.meshes._replace(error_pieces=self.shaft_orders.error_pieces))
 
     @cached_property
     def cycle_coefficients(self) -> Complexes:

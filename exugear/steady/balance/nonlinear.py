@@ -209,12 +209,32 @@ class HarmonicResidual:
         if not self._last or self._last[0][0] is not readings:
             there = self.places.there
             back = self.places.back
-            values, rates = self._sample_readings(readings)
+            values, rates = self._sample_readings(readings - self.deviations)
             sampled = self._sample(there @ values, there @ rates, self.places, self._lattice_stiffness)
-            excess = self.sampling.coefficients(back @ sampled.force) - self._mean_part(readings)
+            excess = self.sampling.coefficients(back @ sampled.force) - self._mean_part(readings) + self._dragged
             self._last[:] = [(readings, excess, sampled)]
         _, excess, sampled = self._last[0]
         return excess, Tangent(self, sampled), sampled.force
+
+    @cached_property
+    def deviations(self) -> Complexes:
+        """What deviations of gears take from the readings (n, m, r): they deflect one flank less and the other more."""
+        found = np.zeros_like(self.static)
+        own = self.model.deviations(self.interface.speed)
+        found[:, : self.meshes, DEFLECTION] = own
+        if self.model.loses_contact:
+            found[:, : self.meshes, BACK] = -own
+        return found
+
+    @cached_property
+    def _dragged(self) -> Complexes:
+        """Forces (n, m, f) of the dampers under deviations of gears, which laws along a row do not have."""
+        found = np.zeros((len(self.static), *self.interface.ports.forces.shape[:2]), dtype=complex)
+        waves = self.model.waves
+        if not self.model.loses_contact:
+            own = self.model.deviations(self.interface.speed)
+            found[:, : self.meshes, DEFLECTION] = -waves.damping * rates_of(self.model, self.interface.speed, own)
+        return found
 
     @cached_property
     def _last(self) -> list[tuple[Complexes, Complexes, LawSamples]]:
@@ -408,7 +428,7 @@ def nonlinear_response(
 def turned_balance(model: HarmonicBalanceModel, interface: Interface, readings: Complexes) -> HarmonicResidual:
     """Return the balance of a model with stated loads at the angles that readings (n, m, r) give their bodies."""
     balance = HarmonicResidual(model, interface, model.sampling)
-    return balance.with_turned_loads(readings) if model.shaft_orders.sidebands else balance
+    return balance.with_turned_loads(readings) if model.shaft_orders.has_loads else balance
 
 
 def solve_turning(
@@ -421,7 +441,7 @@ def solve_turning(
     """
     still = balance
     readings, products = solve_balance(balance, readings, enough)
-    if not balance.model.shaft_orders.sidebands:
+    if not balance.model.shaft_orders.has_loads:
         return balance, readings, products
     size = float(np.linalg.norm(balance.static[..., DEFLECTION]))
     change = np.inf
@@ -645,13 +665,14 @@ def growth_at(balance: HarmonicResidual, readings: Complexes, base: int, least: 
 def growth_of_state(balance: HarmonicResidual, readings: Complexes, parted: bool) -> float:
     """Return the largest growth rate of a disturbance of a steady state over the bases, 1/s.
 
-    Parameters as of `growth_at`; `parted` is True with contact loss. NaN where planets mesh out of phase: the carrier's
-    angle is then an excitation in addition to the mesh cycle.
+    Parameters as of `growth_at`; `parted` is True with contact loss. NaN where planets mesh out of phase, and where
+    gears with deviations lose contact: angles of shafts are then excitations in addition to the mesh cycle.
     """
-    if balance.model.waves.carriers:
+    model = balance.model
+    if model.waves.carriers or (parted and model.deviations(balance.interface.speed).any()):
         return math.nan
     least = PARTING_KICKS if parted else SMOOTH_KICKS
-    return max(growth_at(balance, readings, base, least) for base in range(len(balance.model.waves.base_orders)))
+    return max(growth_at(balance, readings, base, least) for base in range(len(model.waves.base_orders)))
 
 
 def mean_growth(model: HarmonicBalanceModel) -> float:

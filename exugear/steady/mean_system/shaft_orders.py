@@ -94,11 +94,18 @@ class ShaftOrders:
     """(l, size) angle of that body by the static deflections, at zero angle of the input."""
     on_planet: Booleans = field(default_factory=lambda: np.zeros(0, dtype=bool))
     """(l,) whether that body is a planet."""
+    error_pieces: Integers = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
+    """`MeshArrays.error_pieces` with the deviations, which runs in time have."""
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the rotations."""
         return tuple(rotation.name for rotation in self.rotations)
+
+    @property
+    def has_loads(self) -> bool:
+        """Whether any of the terms is a stated load."""
+        return bool((self.load >= 0).any())
 
     @property
     def highest_load(self) -> float:
@@ -107,7 +114,7 @@ class ShaftOrders:
 
     @property
     def products(self) -> tuple[Sidebands, ...]:
-        """Sums and differences of the orders of two stated loads, which nonlinear forces add to these."""
+        """Sums and differences of two orders, which nonlinear forces add to these."""
         orders = {own.multiples for own in self.sidebands if own.base is None}
         both = itertools.product(orders, orders, (1, -1))
         sums = {tuple(a + sign * b for a, b in zip(one, other, strict=True)) for one, other, sign in both}
@@ -367,6 +374,7 @@ class _Series:
             np.array([self.frame.speeds.get(load.body, 0.0) for load in loads]),
             self.frame.matrices(0.0)[0][self.assembly.varying_loads.turning],
             np.array([any(load.body in planets.names for planets in self.frame.sets) for load in loads], dtype=bool),
+            self.assembly.meshes.error_pieces,
         )
 
     def _wheel(self, mesh: int, end: int) -> tuple[str, int]:
