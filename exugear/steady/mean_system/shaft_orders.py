@@ -38,6 +38,7 @@ from exugear.steady.harmonics.lines import (
     fourier_coefficients,
     largest,
 )
+from exugear.steady.mean_system.displaced_pins import has_displaced_pins, pin_deflections
 from exugear.steady.mean_system.mesh_waves import MeshWaves
 from exugear.steady.mean_system.planet_sets import PlanetSet
 from exugear.steady.mean_system.standing_loads import reactions
@@ -188,7 +189,7 @@ def without_deviations(assembly: Assembly) -> Assembly:
 
 def any_shaft_orders(assembly: Assembly) -> bool:
     """Whether gears have deviations, or loads are stated over the angle of a body."""
-    return bool(assembly.meshes.error_pieces.any() or assembly.gearbox.varying_loads)
+    return bool(assembly.meshes.error_pieces.any() or assembly.gearbox.varying_loads or assembly.gearbox.pin_offsets)
 
 
 def shaft_orders(assembly: Assembly, waves: MeshWaves, moved: Callable[[float], Floats] | None = None) -> ShaftOrders:
@@ -204,6 +205,9 @@ def shaft_orders(assembly: Assembly, waves: MeshWaves, moved: Callable[[float], 
     series = _Series(assembly, waves, moved)
     for meshes, planets in waves.groups:
         series.add_family(meshes, planets)
+    for meshes, planets in waves.groups:
+        if planets is not None and has_displaced_pins(assembly, planets):
+            series.add_pins(meshes, planets)
     for n in range(len(assembly.gearbox.varying_loads)):
         series.add_load(n)
     return series.found()
@@ -273,6 +277,23 @@ class _Series:
             size = np.array(list(sizes.values()))
             kept = largest(size, NEGLECTED * float(np.linalg.norm(size))) & (size > 0.0)
             self.beside += [(key, base, None) for key, is_kept in zip(sizes, kept, strict=True) if is_kept]
+
+    def add_pins(self, meshes: tuple[int, ...], planets: PlanetSet) -> None:
+        """Add what displaced pins give to the deflections of the meshes of planets beyond the mean of all."""
+        waves = self.waves.waves
+        own = [n for n, wave in enumerate(waves) if wave.first == meshes[0]]
+        deflections = pin_deflections(self.assembly, planets, meshes)
+        _, shapes = self._shapes_over_turn(planets, len(own))
+        turned = np.fft.fft(np.einsum("snw,n->sw", shapes, deflections), axis=0) / len(shapes)
+        for turn in range(self._most_turns(planets, len(own)) + 1):
+            key = self._key(planets.names[0], planets.carrier, planets, 0, turn)
+            displaced = np.zeros(len(waves), dtype=complex)
+            displaced[own] = -turned[turn]
+            self._add(self.displacement, (DEVIATION, key), displaced)
+            self._add(self.reaction, (DEVIATION, key), np.zeros(self.assembly.size + len(self.without_reactions)))
+            if key:
+                self.beside.append((key, None, None))
+                self.beside += [(key, base, reach) for base, reach in enumerate(self._reaches) if reach]
 
     def add_load(self, number: int) -> None:
         """Add a stated load, which varies with the angle of a body."""
@@ -425,17 +446,26 @@ class _Series:
         angles = self._angles(mesh, end)
         if planets is None:
             return [(0, np.ones(1), self._row(angles, 0.0).astype(complex))]
-        most = max(planets.waves, waves) // 2
-        samples = 2 * (2 * most + 1)
+        turned, shapes = self._shapes_over_turn(planets, waves)
+        rows = [self._row(angles, angle / planets.ratio) for angle in turned.tolist()]
+        of_shapes = np.fft.fft(shapes[:, place], axis=0) / len(turned)
+        of_rows = np.fft.fft(rows, axis=0) / len(turned)
+        most = self._most_turns(planets, waves)
+        return [(turn, of_shapes[turn], of_rows[turn]) for turn in range(-most, most + 1)]
+
+    def _most_turns(self, planets: PlanetSet, waves: int) -> int:
+        """Find the highest multiple of the carrier's angle in the shapes of planets whose meshes have some waves."""
+        return max(planets.waves, waves) // 2
+
+    def _shapes_over_turn(self, planets: PlanetSet, waves: int) -> tuple[Floats, Floats]:
+        """Angles (s,) of the carrier, rad, and the share in waves of the mesh of each planet there (s, n, waves)."""
+        samples = 2 * (2 * self._most_turns(planets, waves) + 1)
         turned = 2.0 * np.pi * np.arange(samples) / samples
         # A flexible ring has more waves than planets: as many as planets give any deviation at these.
         values = planets.values(turned)[:, :, :waves]
-        shapes = np.zeros((samples, waves))
-        shapes[:, : values.shape[2]] = values[:, place] / (values[0] ** 2).sum(axis=0)
-        rows = [self._row(angles, angle / planets.ratio) for angle in turned]
-        of_shapes = np.fft.fft(shapes, axis=0) / samples
-        of_rows = np.fft.fft(rows, axis=0) / samples
-        return [(turn, of_shapes[turn], of_rows[turn]) for turn in range(-most, most + 1)]
+        shapes = np.zeros((samples, planets.waves, waves))
+        shapes[..., : values.shape[2]] = values / (values[0] ** 2).sum(axis=0)
+        return turned, shapes
 
     def _relative(self, body: str, frame: str) -> float:
         """Spin of a body against its frame over the spin of the input."""
