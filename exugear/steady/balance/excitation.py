@@ -671,7 +671,7 @@ class HarmonicBalanceModel:
             acting = acting_forces(self.coupling, self.slow_shifts[2], self._displacements)
         stated = np.full(len(acting), bool(self._friction.size))
         if self.shaft_orders.sidebands:
-            places = self._shaft_places.line[self.shaft_orders.reaction.any(axis=1)]
+            places = self._shaft_places.line[self.shaft_orders.has_forces]
             stated[places[places >= 0]] = True
         return batches_of((acting & moving)[1:], stated[1:])
 
@@ -727,6 +727,13 @@ class HarmonicBalanceModel:
     def deviations(self, speed: float) -> Complexes:
         """Deviations (n, m) of gears in the meshes at the lines, at a speed of the input (rad/s), m."""
         return self._displacements if speed > 0.0 else self._displacements.conj()
+
+    def pin_places(self, speed: float) -> Complexes:
+        """Places (n, size) of planets on displaced pins at the lines, in the rotating frame, at a speed (rad/s), m."""
+        orders = self.shaft_orders
+        if not orders.shift.any():
+            return np.zeros((len(self.lines.index), self.system.size), dtype=complex)
+        return at_lines(orders.shift, self._shaft_places, len(self.lines.index), speed)
 
     def _with_friction(self, stated: Complexes, speed: float) -> Complexes:
         """Generalized forces (n, size) of friction and of loads with reactions (n, size + 6 r) at a speed, rad/s."""

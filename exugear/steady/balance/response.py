@@ -385,6 +385,10 @@ def signals(model: HarmonicBalanceModel, response: Response) -> Complexes:
     """Coefficients (n, signals) of all signals of a response, in the order of `HarmonicBalanceModel.signal_names`."""
     interface = response.interface
     of_motion = interface.rows.of(response.motion, interface.frequencies)
+    places = model.pin_places(interface.speed)
+    if places.any():  # seats move with them; bearings are not strained
+        moving = [name.quantity == "seat_acceleration" for name in interface.rows.names]
+        of_motion[:, moving] += interface.rows.of(places, interface.frequencies)[:, moving]
     # Rows have the bearings of the mean system; what non-linear ones have beyond it acts on their bodies, too.
     if model.bearings is not None:
         beyond = response.excess[:, len(model.waves.waves) :, : model.bearing_signals.shape[1]]

@@ -5,12 +5,12 @@ displaced place the bearings are as before, and the deflection of each mesh of t
 the row g of the deflection by the place of the planet: a deviation that stands still in the frame of the carrier. The
 mean of e along radius and tangent over the planets of a set is part of the static state. What is left has the waves
 that turn with the carrier: it excites at multiples of the carrier's rotation, and beside the mesh orders. Moments of
-the planets' loads about displaced pins are products with e over the radius of the carrier, and are left out, as is the
-centrifugal force of what e adds to that radius.
+the planets' loads about displaced pins, which count by e over the radius of the carrier, are left out.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -22,31 +22,36 @@ from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.stiffness import pack
 from fe_ste.tools.arrays import Complexes, Floats
 
+LEAST = 1e-9
+"""Share of a displacement up to which pins that differ by it are displaced alike."""
 PLANE = 2
 """Coordinates of a place in the plane of a gear."""
 
 
-def has_displaced_pins(assembly: Assembly, planets: PlanetSet) -> bool:
-    """Whether pins of a set of planets are displaced unequally."""
-    return any(np.abs(offset).any() for offset in unequal_pins(assembly, planets).values())
+def unequal_pins(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> dict[str, Floats]:
+    """Offsets (2,) of planets from where their pins would be if all of a set were displaced alike, at zero angle, m.
 
-
-def unequal_pins(assembly: Assembly, planets: PlanetSet) -> dict[str, Floats]:
-    """Offset (2,) of each planet from where its pin would be if all were displaced alike, at zero angle, m.
-
-    Empty without displaced pins.
+    Sets whose pins are displaced alike have none.
     """
-    own = _along_radius(assembly, planets)
-    if not own.any():
-        return {}
-    return _by_name(planets, own - own.mean())
+    found: dict[str, Floats] = {}
+    for planets in sets:
+        own = _along_radius(assembly, planets)
+        beyond = own - own.mean()
+        if np.abs(beyond).max() > LEAST * np.abs(own).max():
+            turned = beyond * np.exp(1j * planets.angles)
+            found |= {name: np.array([way.real, way.imag]) for name, way in zip(planets.names, turned, strict=True)}
+    return found
+
+
+def displaced_carriers(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> set[str]:
+    """Carriers with pins of planets that are displaced unequally."""
+    displaced = unequal_pins(assembly, sets)
+    return {planets.carrier for planets in sets if displaced.keys() & set(planets.names)}
 
 
 def with_equal_pins(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> Assembly:
     """Return an assembly whose planets' pins are all displaced by the mean of their set along radius and tangent."""
-    taken: dict[str, Floats] = {}
-    for planets in sets:
-        taken |= unequal_pins(assembly, planets)
+    taken = unequal_pins(assembly, sets)
     if not taken:
         return assembly
     local = assembly.connectors.local.copy()
@@ -66,11 +71,25 @@ def with_equal_pins(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> Assembly
     return replace(assembly, elements=elements, meshes=meshes)
 
 
-def pin_deflections(assembly: Assembly, planets: PlanetSet, meshes: tuple[int, ...]) -> Floats:
-    """Deflection (n,) that unequal pins of a set of planets give to meshes, by their numbers, m."""
-    taken = unequal_pins(assembly, planets)
+def pin_deflections(assembly: Assembly, sets: tuple[PlanetSet, ...], meshes: tuple[int, ...]) -> Floats:
+    """Deflection (n,) that unequal pins give to meshes, by their numbers, m."""
+    taken = unequal_pins(assembly, sets)
     elements = [assembly.elements[mesh] for mesh in meshes]
     return np.array([_along(own.deflection, _at_ends(own.mesh.pinion, own.mesh.gear, taken)) for own in elements])
+
+
+def pin_places(assembly: Assembly, planets: PlanetSet, turned: float) -> Floats:
+    """Coordinates (size,) by which planets are displaced unequally where their carrier has turned by an angle (rad), m.
+
+    Zero without bearings: there the displacement is in the meshes alone.
+    """
+    found = np.zeros(assembly.size)
+    if assembly.variant.has_bearings:
+        c, s = math.cos(turned), math.sin(turned)
+        for name, offset in unequal_pins(assembly, (planets,)).items():
+            first = assembly.coordinates[name][0]
+            found[first : first + PLANE] = np.array([[c, -s], [s, c]]) @ offset
+    return found
 
 
 def _along_radius(assembly: Assembly, planets: PlanetSet) -> Complexes:
@@ -78,12 +97,6 @@ def _along_radius(assembly: Assembly, planets: PlanetSet) -> Complexes:
     offsets = assembly.gearbox.pin_offsets
     found = np.array([complex(*offsets.get(name, (0.0, 0.0))) for name in planets.names])
     return np.asarray(found * np.exp(-1j * planets.angles))
-
-
-def _by_name(planets: PlanetSet, own: Complexes) -> dict[str, Floats]:
-    """Offsets (2,) of the planets at zero angle from those along radius and tangent."""
-    turned = own * np.exp(1j * planets.angles)
-    return {name: np.array([way.real, way.imag]) for name, way in zip(planets.names, turned, strict=True)}
 
 
 def _at_ends(pinion: str, gear: str, offsets: Mapping[str, Floats]) -> tuple[Floats, Floats]:

@@ -38,7 +38,7 @@ from exugear.steady.harmonics.lines import (
     fourier_coefficients,
     largest,
 )
-from exugear.steady.mean_system.displaced_pins import has_displaced_pins, pin_deflections
+from exugear.steady.mean_system.displaced_pins import displaced_carriers, pin_deflections, pin_places
 from exugear.steady.mean_system.mesh_waves import MeshWaves
 from exugear.steady.mean_system.planet_sets import PlanetSet
 from exugear.steady.mean_system.standing_loads import reactions
@@ -83,6 +83,10 @@ class ShaftOrders:
     reaction: Complexes = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
     """(t, size + 6 r) generalized forces in the rotating frame, by the static forces on deviations and of stated loads,
     these per size at a speed; behind them reactions on fixed bodies, as `reactions` has them."""
+    shift: Complexes = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
+    """(t, size) places in the rotating frame of planets on displaced pins, from which their motion counts, m."""
+    centrifugal: Complexes = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
+    """(t, size) forces of inertia there, N per square of the speed of the input in rad/s."""
     source: tuple[str, ...] = ()
     """(t,) name of the excitation that a term is of; empty for deviations."""
     loads: VaryingLoadArrays = field(default_factory=no_varying_loads)
@@ -100,6 +104,11 @@ class ShaftOrders:
     def names(self) -> tuple[str, ...]:
         """Names of the rotations."""
         return tuple(rotation.name for rotation in self.rotations)
+
+    @property
+    def has_forces(self) -> Booleans:
+        """Whether a term (t,) has forces beside those of the deviations in the meshes."""
+        return np.asarray(self.reaction.any(axis=1) | self.centrifugal.any(axis=1))
 
     @property
     def highest_load(self) -> float:
@@ -127,7 +136,9 @@ class ShaftOrders:
         # Deviations, whose number of a load is -1, have the factor behind those of all loads.
         angles = found[:, 1] + self.loads.order * (self.angles @ static) if len(found) else found[:, 1]
         factors = np.append(found[:, 0] * np.exp(1j * angles), 1.0)[self.load]
-        return np.asarray(self.reaction * factors[:, None])
+        found_forces = self.reaction * factors[:, None]
+        found_forces[:, : self.centrifugal.shape[1]] += speed**2 * self.centrifugal
+        return np.asarray(found_forces)
 
     def change_by_turning(self, sampling: TorusSampling, motion: Complexes, speed: float, static: Floats) -> Complexes:
         """Find how forces and reactions (lines, size + 6 r) change with the turning of the stated loads' bodies.
@@ -205,9 +216,10 @@ def shaft_orders(assembly: Assembly, waves: MeshWaves, moved: Callable[[float], 
     series = _Series(assembly, waves, moved)
     for meshes, planets in waves.groups:
         series.add_family(meshes, planets)
-    for meshes, planets in waves.groups:
-        if planets is not None and has_displaced_pins(assembly, planets):
-            series.add_pins(meshes, planets)
+    displaced = displaced_carriers(assembly, waves.system.frame.sets)
+    for planets in waves.system.frame.sets:
+        if planets.carrier in displaced:
+            series.add_pins(planets)
     for n in range(len(assembly.gearbox.varying_loads)):
         series.add_load(n)
     return series.found()
@@ -237,6 +249,8 @@ class _Series:
         """Order of each rotation, by its name; those of carriers whose planets mesh out of phase come first."""
         self.displacement: dict[tuple[int, Key], Complexes] = {}
         self.reaction: dict[tuple[int, Key], Complexes] = {}
+        self.shift: dict[tuple[int, Key], Complexes] = {}
+        self.centrifugal: dict[tuple[int, Key], Complexes] = {}
         self.reactions = reactions(assembly)
         self.without_reactions = np.zeros(self.reactions.shape[1])
         self.beside: list[tuple[Key, int | None, int | None]] = []
@@ -278,22 +292,48 @@ class _Series:
             kept = largest(size, NEGLECTED * float(np.linalg.norm(size))) & (size > 0.0)
             self.beside += [(key, base, None) for key, is_kept in zip(sizes, kept, strict=True) if is_kept]
 
-    def add_pins(self, meshes: tuple[int, ...], planets: PlanetSet) -> None:
-        """Add what displaced pins give to the deflections of the meshes of planets beyond the mean of all."""
-        waves = self.waves.waves
-        own = [n for n, wave in enumerate(waves) if wave.first == meshes[0]]
-        deflections = pin_deflections(self.assembly, planets, meshes)
-        _, shapes = self._shapes_over_turn(planets, len(own))
-        turned = np.fft.fft(np.einsum("snw,n->sw", shapes, deflections), axis=0) / len(shapes)
-        for turn in range(self._most_turns(planets, len(own)) + 1):
+    def add_pins(self, planets: PlanetSet) -> None:
+        """Add what unequally displaced pins of a set give to the deflections of meshes, and centrifugal forces."""
+        families = [meshes for meshes, group in self.waves.groups if group is planets]
+        counts = [sum(wave.first == meshes[0] for wave in self.waves.waves) for meshes in families]
+        most = max((self._most_turns(planets, count) for count in counts), default=0)
+        displaced = np.zeros((most + 1, len(self.waves.waves)), dtype=complex)
+        for meshes, count in zip(families, counts, strict=True):
+            own = [n for n, wave in enumerate(self.waves.waves) if wave.first == meshes[0]]
+            deflections = pin_deflections(self.assembly, self.frame.sets, meshes)
+            _, shapes = self._shapes_over_turn(planets, count)
+            turned = np.fft.fft(np.einsum("snw,n->sw", shapes, deflections), axis=0) / len(shapes)
+            turns = self._most_turns(planets, count) + 1
+            displaced[:turns, own] = -turned[:turns]
+        shift, pushed = self._pin_motion(planets, most)
+        for turn in range(most + 1):
             key = self._key(planets.names[0], planets.carrier, planets, 0, turn)
-            displaced = np.zeros(len(waves), dtype=complex)
-            displaced[own] = -turned[turn]
-            self._add(self.displacement, (DEVIATION, key), displaced)
+            self._add(self.displacement, (DEVIATION, key), displaced[turn])
             self._add(self.reaction, (DEVIATION, key), np.zeros(self.assembly.size + len(self.without_reactions)))
+            self._add(self.shift, (DEVIATION, key), shift[turn])
+            self._add(self.centrifugal, (DEVIATION, key), pushed[turn])
             if key:
                 self.beside.append((key, None, None))
                 self.beside += [(key, base, reach) for base, reach in enumerate(self._reaches) if reach]
+
+    def _pin_motion(self, planets: PlanetSet, most: int) -> tuple[Complexes, Complexes]:
+        """Places that unequal pins give to planets (t, size) in the rotating frame, by multiples of the carrier's turn.
+
+        The centrifugal forces there follow, N per square of the speed of the input in rad/s.
+        """
+        samples = 2 * most + 1
+        still = np.zeros(self.assembly.size)
+        shifts, forces = [], []
+        for angle in (2.0 * np.pi * np.arange(samples) / samples).tolist():
+            psi = angle / planets.ratio
+            q = self.frame.state(psi, 0.0, self.waves.system.static_at(self.speed))[0]
+            place = pin_places(self.assembly, planets, angle)
+            by_place = self.assembly.inertia_forces(q, still, place) - self.assembly.inertia_forces(q, still, still)
+            frame = self.frame.matrices(psi)[0]
+            shifts.append(np.linalg.solve(frame, place))
+            forces.append(planets.ratio**2 * by_place @ frame)
+        found = np.fft.fft([shifts, forces], axis=1) / samples
+        return found[0], found[1]
 
     def add_load(self, number: int) -> None:
         """Add a stated load, which varies with the angle of a body."""
@@ -376,12 +416,14 @@ class _Series:
         if not self.displacement:
             return ShaftOrders()
         loads = self.assembly.gearbox.varying_loads
+        none = np.zeros(self.assembly.size, dtype=complex)
         return ShaftOrders(
             tuple(Rotation(name, self.orders[name]) for name in names[carriers:]),
             tuple(Sidebands(row(key)[meshes:], base, reach) for key, base, reach in self.beside),
             np.array([row(key) for _, key in self.displacement], dtype=np.int64),
             np.array(list(self.displacement.values())),
             np.array([self.reaction[term] for term in self.displacement]),
+            *(np.array([of.get(term, none) for term in self.displacement]) for of in (self.shift, self.centrifugal)),
             tuple("" if n == DEVIATION else loads[n].excitation for n, _ in self.displacement),
             self.assembly.varying_loads,
             np.array([n for n, _ in self.displacement], dtype=np.int64),
