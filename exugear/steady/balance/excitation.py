@@ -214,12 +214,14 @@ class HarmonicBalanceModel:
     @cached_property
     def bearing_signals(self) -> Integers:
         """Places (b, 3) of the forces of non-linear bearings among the signals."""
-        axes = np.arange(len(AXES))
         if self.bearings is None:
-            return np.zeros((0, len(axes)), dtype=np.int64)
-        supports = [wave.connectors[wave.wave] for wave in self.bearings.waves]
+            return np.zeros((0, len(AXES)), dtype=np.int64)
+        return self.support_forces(np.array([wave.connectors[wave.wave] for wave in self.bearings.waves]))
+
+    def support_forces(self, supports: Integers) -> Integers:
+        """Places (s, 3) of the forces of supports (s,), by their numbers, among the signals."""
         first = [signal_name.quantity for signal_name in self.signal_names].index("support_force")
-        return np.asarray(first + len(axes) * np.array(supports)[:, None] + axes)
+        return np.asarray(first + len(AXES) * supports[:, None] + np.arange(len(AXES)))
 
     @cached_property
     def bearing_moments(self) -> tuple[Integers, Integers]:
@@ -744,10 +746,15 @@ class HarmonicBalanceModel:
 
     def with_turned_loads(self, interface: Interface, motion: Complexes) -> Interface:
         """Return the interface with stated loads at the angles to which a motion (n, size) turns their bodies."""
+        static = self.system.static_at(interface.speed)
+        change = self.shaft_orders.change_by_turning(self.sampling, motion, interface.speed, static)
+        return self.with_more_loads(interface, change)
+
+    def with_more_loads(self, interface: Interface, more: Complexes) -> Interface:
+        """Return the interface with loads and reactions (n, size + 6 r) in addition to those of the shafts' orders."""
         speed = interface.speed
         system = self.system
-        change = self.shaft_orders.change_by_turning(self.sampling, motion, speed, system.static_at(speed))
-        loads = self._shaft_loads(speed) + change
+        loads = self._shaft_loads(speed) + more
         pencil = system.stiffness_at(speed), system.damping_at(speed)
         other = self._with_friction(loads, speed)
         still = system.still(pencil[0], other[0].real[:, None])[:, 0]

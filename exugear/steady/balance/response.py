@@ -46,6 +46,8 @@ PASSING_TOLERANCE = 1e-6
 """The same where planets pass a flexible ring gear: neighbours that are left out are larger by far."""
 POSITIONS_REPEATED = 2
 """Solutions after the first one, with positions in the mesh cycle that move with the orders of shafts."""
+BEARINGS_REPEATED = 2
+"""Times that forces of bearings of unequally loaded planets follow from the solution before."""
 LARGEST_SHIFT = 0.1
 """Motion of a position, mesh cycles, above which forces are not linear in it: it is neglected there.
 
@@ -76,18 +78,31 @@ class Response:
     @cached_property
     def motion(self) -> Complexes:
         """Coefficients (n, size) of the motion about the static state, in the rotating frame."""
-        lines, size = self.interface.motion.shape[:2]
-        found = self.interface.motion.reshape(lines, size, -1) @ self.excess.reshape(lines, -1, 1)
-        loads = self.interface.loads
-        if loads is None:
-            return np.asarray(-found[..., 0])
-        return np.asarray(loads.motion - found[..., 0])
+        return _motion(self.interface, self.excess.reshape(len(self.excess), -1))
 
     @property
     def torque(self) -> float:
         """Mean torque of the drive that keeps the speed, N m."""
         torque = self.interface.torque - float(np.sum(self.interface.torque_per_force * self.excess[0].real))
         return torque if self.interface.loads is None else torque + self.interface.loads.torque
+
+
+def _motion(interface: Interface, excess: Complexes) -> Complexes:
+    """Motion (n, size) about the static state under forces (n, m f) beyond the averaged system, and other loads."""
+    lines, size = interface.motion.shape[:2]
+    found = interface.motion.reshape(lines, size, -1) @ excess[..., None]
+    if interface.loads is None:
+        return np.asarray(-found[..., 0])
+    return np.asarray(interface.loads.motion - found[..., 0])
+
+
+def with_unequal_bearings(model: HarmonicBalanceModel, interface: Interface, motion: Complexes) -> Interface:
+    """Return the interface with what bearings of unequally loaded planets have more in a motion (n, size)."""
+    reactions = np.zeros((len(motion), BODY_SIZE * len(model.reacting_excitations)))
+    found = np.zeros_like(motion)
+    for own in model.shaft_orders.bearings:
+        found += own.at(model.lines, model.base_names.index(own.carrier), interface.speed, motion)[0]
+    return model.with_more_loads(interface, np.hstack([found, reactions]))
 
 
 def linear_response(model: HarmonicBalanceModel, interface: Interface) -> Response:
@@ -99,8 +114,10 @@ def linear_response(model: HarmonicBalanceModel, interface: Interface) -> Respon
     """
     excess = transmission_errors(model, interface.ports, interface.speed)
     excess[..., DEFLECTION] += mean_deviation_forces(model, interface.speed)
-    deflection = interface.static[..., DEFLECTION] + _answer(interface, excess)[..., DEFLECTION]
-    return _response(model, interface, deflection, excess, 0)
+    answer = _answer(interface, excess)[..., DEFLECTION]
+    for _ in range(BEARINGS_REPEATED if model.shaft_orders.bearings else 0):
+        interface = with_unequal_bearings(model, interface, _motion(interface, excess.reshape(len(excess), -1)))
+    return _response(model, interface, interface.static[..., DEFLECTION] + answer, excess, 0)
 
 
 def transmission_errors(model: HarmonicBalanceModel, ports: MeshInterface, speed: float) -> Complexes:
@@ -256,6 +273,9 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
             break
         if again and positions is not None:
             moved = positions.forces(deflection, excess)
+        if again and model.shaft_orders.bearings:
+            interface = with_unequal_bearings(model, interface, _motion(interface, excess))
+            still = lengths * interface.static[..., : shape[2]].reshape(shape[0], -1)
         if again and model.ring is not None:
             response = _response(model, interface, deflection, excess.reshape(shape), products)
             shifted = at_mean_positions(model, interface, response)
@@ -386,6 +406,10 @@ def signals(model: HarmonicBalanceModel, response: Response) -> Complexes:
     interface = response.interface
     of_motion = interface.rows.of(response.motion, interface.frequencies)
     places = model.pin_places(interface.speed)
+    for own in model.shaft_orders.bearings:
+        carrier = model.base_names.index(own.carrier)
+        more = own.at(model.lines, carrier, interface.speed, response.motion)[1]
+        of_motion[:, model.support_forces(own.supports).ravel()] += more
     if places.any():  # seats move with them; bearings are not strained
         moving = [name.quantity == "seat_acceleration" for name in interface.rows.names]
         of_motion[:, moving] += interface.rows.of(places, interface.frequencies)[:, moving]

@@ -42,6 +42,7 @@ from exugear.steady.mean_system.displaced_pins import displaced_carriers, pin_de
 from exugear.steady.mean_system.mesh_waves import MeshWaves
 from exugear.steady.mean_system.planet_sets import PlanetSet
 from exugear.steady.mean_system.standing_loads import reactions
+from exugear.steady.mean_system.unequal_bearings import UnequalBearings, unequal_bearings
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.system.kernels.meshes import FRAME
 from exugear.system.kernels.turning import travelling_tangent
@@ -87,6 +88,8 @@ class ShaftOrders:
     """(t, size) places in the rotating frame of planets on displaced pins, from which their motion counts, m."""
     centrifugal: Complexes = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
     """(t, size) forces of inertia there, N per square of the speed of the input in rad/s."""
+    bearings: tuple[UnequalBearings, ...] = ()
+    """Bearings that planets on displaced pins load unequally."""
     source: tuple[str, ...] = ()
     """(t,) name of the excitation that a term is of; empty for deviations."""
     loads: VaryingLoadArrays = field(default_factory=no_varying_loads)
@@ -251,6 +254,7 @@ class _Series:
         self.reaction: dict[tuple[int, Key], Complexes] = {}
         self.shift: dict[tuple[int, Key], Complexes] = {}
         self.centrifugal: dict[tuple[int, Key], Complexes] = {}
+        self.bearings: list[UnequalBearings] = []
         self.reactions = reactions(assembly)
         self.without_reactions = np.zeros(self.reactions.shape[1])
         self.beside: list[tuple[Key, int | None, int | None]] = []
@@ -307,14 +311,29 @@ class _Series:
             displaced[:turns, own] = -turned[:turns]
         shift, pushed = self._pin_motion(planets, most)
         for turn in range(most + 1):
-            key = self._key(planets.names[0], planets.carrier, planets, 0, turn)
+            key = self._turns(planets, turn)
             self._add(self.displacement, (DEVIATION, key), displaced[turn])
             self._add(self.reaction, (DEVIATION, key), np.zeros(self.assembly.size + len(self.without_reactions)))
             self._add(self.shift, (DEVIATION, key), shift[turn])
             self._add(self.centrifugal, (DEVIATION, key), pushed[turn])
-            if key:
-                self.beside.append((key, None, None))
-                self.beside += [(key, base, reach) for base, reach in enumerate(self._reaches) if reach]
+        self._add_bearings(planets, most)
+        # The lateral vibration of central bodies passes the planets' differences: that adds a turn of the carrier.
+        for turn in range(1, most + 2):
+            key = self._turns(planets, turn)
+            self.beside += [(key, None, None)] if turn <= most else []
+            self.beside += [(key, base, reach) for base, reach in enumerate(self._reaches) if reach]
+
+    def _add_bearings(self, planets: PlanetSet, most: int) -> None:
+        """Add what bearings that are not equal have beyond their mean in the static state, up to a turn of the set."""
+        unequal = unequal_bearings(self.assembly, self.waves.system, planets)
+        if unequal is None:
+            return
+        self.bearings.append(unequal)
+        for turn, still in zip(unequal.turns.tolist(), unequal.still, strict=True):
+            if 0 <= turn <= most:
+                pushed = np.zeros(self.assembly.size + len(self.without_reactions), dtype=complex)
+                pushed[unequal.coordinates] = still
+                self._add(self.reaction, (DEVIATION, self._turns(planets, turn)), pushed)
 
     def _pin_motion(self, planets: PlanetSet, most: int) -> tuple[Complexes, Complexes]:
         """Places that unequal pins give to planets (t, size) in the rotating frame, by multiples of the carrier's turn.
@@ -424,6 +443,7 @@ class _Series:
             np.array(list(self.displacement.values())),
             np.array([self.reaction[term] for term in self.displacement]),
             *(np.array([of.get(term, none) for term in self.displacement]) for of in (self.shift, self.centrifugal)),
+            tuple(self.bearings),
             tuple("" if n == DEVIATION else loads[n].excitation for n, _ in self.displacement),
             self.assembly.varying_loads,
             np.array([n for n, _ in self.displacement], dtype=np.int64),
@@ -531,6 +551,10 @@ class _Series:
             same = math.copysign(1.0, before[1] * planets.ratio)
             rotations[name] = turn + int(same) * before[0], planets.ratio
         return self._multiples(rotations)
+
+    def _turns(self, planets: PlanetSet, turn: int) -> Key:
+        """Multiple of the rotation of the carrier of planets."""
+        return self._multiples({self._carrier(planets): (turn, planets.ratio)} if turn else {})
 
     def _multiples(self, rotations: Mapping[str, tuple[int, float]]) -> Key:
         """Multiples of rotations, given with the speed of each over that of the input; a new one becomes a base."""
