@@ -177,12 +177,12 @@ def check_law(name: str, method: Method) -> None:
 
 
 def check_deviations(gearbox: Gearbox, method: Method) -> None:
-    """Refuse deviations of gears, and trains without meshes, with the method that evaluates the mesh models in time.
+    """Refuse deviations of gears and pins, and trains without meshes, with the method that evaluates models in time.
 
     Raises
     ------
     SteadyError
-        The gearbox file has deviations or no meshes, and the method is ``nonlinear``.
+        The gearbox file has deviations, displaced pins or no meshes, and the method is ``nonlinear``.
     """
     if not gearbox.meshes and method == "nonlinear":
         raise SteadyError(
@@ -192,6 +192,12 @@ def check_deviations(gearbox: Gearbox, method: Method) -> None:
     if gearbox.deviations and method == "nonlinear":
         raise SteadyError(
             "deviations: the method nonlinear does not include deviations of gears; use --method parametric with "
+            "--mesh-model line_of_action, or exugear run"
+        )
+    turning = {body.name for body in gearbox.bodies() if body.carrier is not None}
+    if method == "nonlinear" and turning & gearbox.pin_offsets.keys():
+        raise SteadyError(
+            "pins: the method nonlinear does not include displaced planet pins; use --method parametric with "
             "--mesh-model line_of_action, or exugear run"
         )
 

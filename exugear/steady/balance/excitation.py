@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import copy
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cached_property
 
 import numpy as np
 
 from exugear.results.sound.radiated_power import RadiatedPower, radiated_power
 from exugear.steady.balance.acting_forces import acting_forces
+from exugear.steady.balance.harmonic_truncation import HarmonicTruncation
 from exugear.steady.balance.interface import Interface, LoadResponse
 from exugear.steady.harmonics.linear_solvers import Batches, batches_of
 from exugear.steady.harmonics.lines import (
@@ -19,7 +20,6 @@ from exugear.steady.harmonics.lines import (
     LineSet,
     TorusSampling,
     beside,
-    count_of_lines,
     joined,
     line_set,
     modulated,
@@ -79,36 +79,6 @@ SHAFT_NEIGHBOURS = 3
 
 Half as many as of the meshes' orders: there are many of them. In the planetary stage of the GRC they change by 1e-6 at
 most with twice as many."""
-MOST_LINES = 500
-"""Combinations up to which lines are looked for: those up to the eighth of three mesh frequencies, the 21st of two."""
-
-
-@dataclass(frozen=True)
-class HarmonicTruncation:
-    """How far a set of lines reaches: harmonics of each mesh frequency, largest sum of multiples of several."""
-
-    harmonics: int
-    combinations: int
-
-    def around(self, lines: LineSet, bases: int, clear: bool) -> HarmonicTruncation:
-        """Return this one, doubled until it has lines of so many bases; combinations up to `MOST_LINES`.
-
-        `clear` asks that none of them is at its edge.
-        """
-        multiples = np.abs(lines.index[:, :bases])
-        alone = np.count_nonzero(multiples, axis=1) == 1
-        sums = multiples.sum(axis=1) + clear
-        harmonics = self.harmonics
-        combinations = self.combinations
-        while sums[alone].max(initial=0) > harmonics:
-            harmonics *= 2
-        while sums[~alone].max(initial=0) > combinations:
-            sooner = combinations
-            later = range(combinations + 1, 2 * combinations + 1)
-            combinations = max((n for n in later if count_of_lines(bases, n) <= MOST_LINES), default=sooner)
-            if combinations == sooner:
-                break
-        return HarmonicTruncation(harmonics, combinations)
 
 
 class HarmonicBalanceModel:
@@ -522,6 +492,20 @@ class HarmonicBalanceModel:
     def pulls_over_cycle(self) -> CycleFunctions:
         """Derivative of the forces that curves have without deflection by the position, N per cycle."""
         return self.functions({(DEFLECTION, DEFLECTION): -self._derivative * self.cycle_pulls})
+
+    @cached_property
+    def bends_over_cycle(self) -> tuple[CycleFunctions, CycleFunctions]:
+        """Derivative of the tangents of curves by the deflection, N/m2, and its product with that at the load, N/m.
+
+        A curve of load over deflection is the load times the power m of deflection over that at this load.
+        """
+        waves = self.waves
+        bend = waves.cycle_coefficients("exponent", "tangent", "secant", harmonics=self.harmonics)
+        slope = waves.cycle_coefficients("exponent", "tangent", harmonics=self.harmonics)
+        curved = waves.loads[:, None] > 0.0
+        bend = np.where(curved, bend / np.where(curved, waves.loads[:, None], 1.0), 0.0)
+        key = DEFLECTION, DEFLECTION
+        return self.functions({key: bend}), self.functions({key: np.where(curved, -slope, 0.0)})
 
     @property
     def _derivative(self) -> Complexes:

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -166,57 +167,61 @@ def deviation_forces(
     return forces - beyond.reshape(forces.shape)
 
 
-class MovingPositions:
-    """Forces that meshes have because their positions in the cycle move with the shafts' orders, at one speed.
+class SlowChanges:
+    """Forces that meshes have because the shafts' orders move them, at one speed.
 
-    A change p of the position changes the force by p dF/dpmc. It makes the sidebands of mesh orders that a frequency
-    modulation has.
+    A slow change p of the position in the mesh cycle changes the force by p dF/dpmc, and a slow change of deflection
+    the stiffness of a curve of load over deflection. Both make sidebands of mesh orders.
     """
 
     def __init__(self, model: HarmonicBalanceModel, interface: Interface) -> None:
         ports = interface.ports
         self._model = model
-        self._interface = interface
+        self._ports = ports
+        self._speed = interface.speed
         self._shape = len(model.lines.index), *ports.forces.shape[:2]
-        self._slopes = flat(model.slopes_over_cycle.at(ports, interface.speed))
         self._lines, self._places, self._coupling = model.slow_shifts
         self._products = [wave_products(family, interface.speed) for family in model.families]
         self._rows = np.ascontiguousarray(ports.readings[: self._shape[1], POSITION].T)
+        self._by_position = self._forces_by_deflection(model.slopes_over_cycle, model.pulls_over_cycle)
+        self._by_deflection = self._forces_by_deflection(*model.bends_over_cycle) if model.waves.loads.any() else None
 
-    @cached_property
-    def _pulls(self) -> Complexes | float:
-        """Changes (n, m, f) of the forces that curves have without deflection, N per cycle."""
-        model = self._model
-        if not model.waves.loads.any():
-            return 0.0
-        ports = self._interface.ports
-        pulls = model.pulls_over_cycle
-        return _products_of_constants(model, pulls, ports, self._interface.speed, _everywhere(model, ports))
+    def _forces_by_deflection(self, functions: CycleFunctions, given: CycleFunctions) -> tuple[Any, Complexes | float]:
+        """Functions of the mesh cycle of a deflection as `flat` has them, and forces (n, m, f) of curves without it."""
+        ports = self._ports
+        constants: Complexes | float = 0.0
+        if self._model.waves.loads.any():
+            everywhere = _everywhere(self._model, ports)
+            constants = _products_of_constants(self._model, given, ports, self._speed, everywhere)
+        return flat(functions.at(ports, self._speed)), constants
 
-    def forces(self, deflections: Complexes, excess: Complexes) -> Complexes:
-        """Find the forces (n, m, f) at deflections (n, m) under forces (n, m f) beyond the averaged system, N."""
-        model = self._model
-        interface = self._interface
+    def forces(self, deflections: Complexes, motion: Complexes) -> Complexes:
+        """Find the forces (n, m, f) at deflections (n, m) and a motion (n, size) about the static state, N."""
         found = np.zeros(self._shape, dtype=complex)
-        moving = interface.motion[self._lines].reshape(len(self._lines), self._rows.shape[0], -1)
-        motion = -(moving @ excess[self._lines, :, None])[..., 0]
-        if interface.loads is not None:
-            motion += interface.loads.motion[self._lines]
-        positions = motion @ self._rows
+        along = found.copy()
+        along[..., DEFLECTION] = deflections - self._model.deviations(self._speed)
+        positions = motion[self._lines] @ self._rows
         if (2.0 * np.abs(positions)).sum(axis=0).max(initial=0.0) > LARGEST_SHIFT:
             return found
-        along = np.zeros(self._shape, dtype=complex)
-        along[..., DEFLECTION] = deflections - model.deviations(interface.speed)
-        changes = model.coupling.of_flat(self._slopes, along.reshape(len(along), -1)).reshape(self._shape) + self._pulls
-        shifts = np.concatenate([positions, positions.conj()])
-        functions = []
+        found[..., DEFLECTION] = self._modulated(positions, along, self._by_position)
+        if self._by_deflection is not None:
+            slow = along[self._lines, :, DEFLECTION]
+            along[self._lines] = 0.0
+            found[..., DEFLECTION] += self._modulated(slow, along, self._by_deflection)
+        return found
+
+    def _modulated(self, slow: Complexes, along: Complexes, law: tuple[Any, Complexes | float]) -> Complexes:
+        """Find products (n, m) of slow signals (q, m) of the meshes with forces of a law at deflections (n, m, f)."""
+        functions, given = law
+        changes = self._model.coupling.of_flat(functions, along.reshape(len(along), -1)).reshape(self._shape) + given
+        shifts = np.concatenate([slow, slow.conj()])
+        turned = []
         for group, places, products in zip(self._coupling.groups, self._places, self._products, strict=True):
             own = shifts[:, group.begin : group.begin + products.shape[2]]
             function = np.zeros((len(group.harmonics), group.size, group.size), dtype=complex)
             np.add.at(function[..., : products.shape[3]], places, np.einsum("tvwx,qw->qtvx", products, own))
-            functions.append(function)
-        found[..., DEFLECTION] = self._coupling.of(functions, changes[..., DEFLECTION])
-        return found
+            turned.append(function)
+        return self._coupling.of(turned, changes[..., DEFLECTION])
 
 
 def _everywhere(model: HarmonicBalanceModel, ports: MeshInterface) -> Floats:
@@ -245,7 +250,7 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
 
     The equations y = y_static - G (K y - given) of all lines are solved with readings as lengths, l y. Where gears have
     deviations, the position moves with the orders of their shafts, too: what that adds to the forces is given by the
-    solution before (`MovingPositions`). Without meshes it is the response of the method `linear`.
+    solution before (`SlowChanges`). Without meshes it is the response of the method `linear`.
     """
     if not model.waves.waves:
         return linear_response(model, interface)
@@ -258,7 +263,7 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
     passing = balance.passing
     given = given_forces(model, interface) + deviation_forces(model, interface, passing)
     moved = np.zeros_like(given)
-    positions = MovingPositions(model, interface) if repeated else None
+    slow = SlowChanges(model, interface) if repeated else None
     found = None
     products = 0
     for again in reversed(range(1 + (POSITIONS_REPEATED if repeated else 0))):
@@ -271,8 +276,8 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
         deflection = (found / lengths).reshape(shape)[..., DEFLECTION]
         if before is not None and model.ring is None and _is_settled(found, before):
             break
-        if again and positions is not None:
-            moved = positions.forces(deflection, excess)
+        if again and slow is not None:
+            moved = slow.forces(deflection, _motion(interface, excess))
         if again and model.shaft_orders.bearings:
             interface = with_unequal_bearings(model, interface, _motion(interface, excess))
             still = lengths * interface.static[..., : shape[2]].reshape(shape[0], -1)

@@ -313,7 +313,7 @@ class _Series:
         for turn in range(most + 1):
             key = self._turns(planets, turn)
             self._add(self.displacement, (DEVIATION, key), displaced[turn])
-            self._add(self.reaction, (DEVIATION, key), np.zeros(self.assembly.size + len(self.without_reactions)))
+            self._add(self.reaction, (DEVIATION, key), self._no_reaction)
             self._add(self.shift, (DEVIATION, key), shift[turn])
             self._add(self.centrifugal, (DEVIATION, key), pushed[turn])
         self._add_bearings(planets, most)
@@ -331,7 +331,7 @@ class _Series:
         self.bearings.append(unequal)
         for turn, still in zip(unequal.turns.tolist(), unequal.still, strict=True):
             if 0 <= turn <= most:
-                pushed = np.zeros(self.assembly.size + len(self.without_reactions), dtype=complex)
+                pushed = self._no_reaction
                 pushed[unequal.coordinates] = still
                 self._add(self.reaction, (DEVIATION, self._turns(planets, turn)), pushed)
 
@@ -342,17 +342,18 @@ class _Series:
         """
         samples = 2 * most + 1
         still = np.zeros(self.assembly.size)
-        shifts, forces = [], []
+        shifts: list[Floats] = []
+        forces: list[Floats] = []
         for angle in (2.0 * np.pi * np.arange(samples) / samples).tolist():
             psi = angle / planets.ratio
             q = self.frame.state(psi, 0.0, self.waves.system.static_at(self.speed))[0]
             place = pin_places(self.assembly, planets, angle)
             by_place = self.assembly.inertia_forces(q, still, place) - self.assembly.inertia_forces(q, still, still)
             frame = self.frame.matrices(psi)[0]
-            shifts.append(np.linalg.solve(frame, place))
+            shifts.append(np.asarray(np.linalg.solve(frame, place), dtype=np.float64))
             forces.append(planets.ratio**2 * by_place @ frame)
-        found = np.fft.fft([shifts, forces], axis=1) / samples
-        return found[0], found[1]
+        of_shifts, of_forces = (np.fft.fft(np.array(values), axis=0) / samples for values in (shifts, forces))
+        return of_shifts, of_forces
 
     def add_load(self, number: int) -> None:
         """Add a stated load, which varies with the angle of a body."""
@@ -370,6 +371,11 @@ class _Series:
             self._add(self.reaction, (number, key), turned)
             self.beside.append((key, None, None))
             self.beside += [(key, base, reach) for base, reach in enumerate(self._reaches) if reach]
+
+    @property
+    def _no_reaction(self) -> Complexes:
+        """Forces and reactions of nothing, (size + 6 r,)."""
+        return np.zeros(self.assembly.size + len(self.without_reactions), dtype=complex)
 
     @cached_property
     def _turned_by_passing(self) -> Floats:
@@ -436,20 +442,22 @@ class _Series:
             return ShaftOrders()
         loads = self.assembly.gearbox.varying_loads
         none = np.zeros(self.assembly.size, dtype=complex)
+        terms = list(self.displacement)
         return ShaftOrders(
-            tuple(Rotation(name, self.orders[name]) for name in names[carriers:]),
-            tuple(Sidebands(row(key)[meshes:], base, reach) for key, base, reach in self.beside),
-            np.array([row(key) for _, key in self.displacement], dtype=np.int64),
-            np.array(list(self.displacement.values())),
-            np.array([self.reaction[term] for term in self.displacement]),
-            *(np.array([of.get(term, none) for term in self.displacement]) for of in (self.shift, self.centrifugal)),
-            tuple(self.bearings),
-            tuple("" if n == DEVIATION else loads[n].excitation for n, _ in self.displacement),
-            self.assembly.varying_loads,
-            np.array([n for n, _ in self.displacement], dtype=np.int64),
-            np.array([self.frame.speeds.get(load.body, 0.0) for load in loads]),
-            self.frame.matrices(0.0)[0][self.assembly.varying_loads.turning],
-            np.array([any(load.body in planets.names for planets in self.frame.sets) for load in loads], dtype=bool),
+            rotations=tuple(Rotation(name, self.orders[name]) for name in names[carriers:]),
+            sidebands=tuple(Sidebands(row(key)[meshes:], base, reach) for key, base, reach in self.beside),
+            multiples=np.array([row(key) for _, key in terms], dtype=np.int64),
+            displacement=np.array(list(self.displacement.values())),
+            reaction=np.array([self.reaction[term] for term in terms]),
+            shift=np.array([self.shift.get(term, none) for term in terms]),
+            centrifugal=np.array([self.centrifugal.get(term, none) for term in terms]),
+            bearings=tuple(self.bearings),
+            source=tuple("" if n == DEVIATION else loads[n].excitation for n, _ in terms),
+            loads=self.assembly.varying_loads,
+            load=np.array([n for n, _ in terms], dtype=np.int64),
+            speeds=np.array([self.frame.speeds.get(load.body, 0.0) for load in loads]),
+            angles=self.frame.matrices(0.0)[0][self.assembly.varying_loads.turning],
+            on_planet=np.array([any(load.body in own.names for own in self.frame.sets) for load in loads], dtype=bool),
         )
 
     def _wheel(self, mesh: int, end: int) -> tuple[str, int]:

@@ -160,14 +160,13 @@ def _beyond_mean(
     forces = np.zeros((2, *q.shape))
     for own, connectors in zip(forces, both, strict=True):
         add_connector_forces(q, v, connectors, own)
-    loads = [
-        [-connector_loads(*state, connectors)[:, :AXES].ravel() for state in zip(q, v, strict=True)]
-        for connectors in both
-    ]
+    loads = np.zeros((2, len(q), AXES * len(numbers)))
+    for own, connectors in zip(loads, both, strict=True):
+        own[:] = [-connector_loads(*state, connectors)[:, :AXES].ravel() for state in zip(q, v, strict=True)]
     entries = (AXES * numbers[:, None] + np.arange(AXES)).ravel()
     turn = support_waves(frame.assembly, frame.sets, psi)[0][np.ix_(entries, entries)]
     generalized = ((forces[0] - forces[1]) @ frame.matrices(psi)[0])[:, coordinates]
-    found = np.hstack([generalized, np.subtract(*loads) @ turn.T])
+    found = np.hstack([generalized, (loads[0] - loads[1]) @ turn.T])
     count = len(coordinates)
     ahead, back, faster, slower = (found[1 + n * count : 1 + (n + 1) * count] for n in range(4))
     return found[0], (ahead - back).T / (2.0 * step), (faster - slower).T / (2.0 * RATE_STEP)
