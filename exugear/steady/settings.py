@@ -176,18 +176,26 @@ def check_law(name: str, method: Method) -> None:
         )
 
 
-def check_meshes(gearbox: Gearbox, method: Method) -> None:
-    """Refuse trains without meshes with the method that evaluates the mesh models in time.
+def check_nonlinear(gearbox: Gearbox, method: Method) -> None:
+    """Refuse trains without meshes, and displaced planet pins, with the method that evaluates models in time.
 
     Raises
     ------
     SteadyError
-        The gearbox file has no meshes, and the method is ``nonlinear``.
+        The gearbox file has displaced pins or no meshes, and the method is ``nonlinear``.
     """
-    if not gearbox.meshes and method == "nonlinear":
+    if method != "nonlinear":
+        return
+    if not gearbox.meshes:
         raise SteadyError(
             "meshes: the train has none whose forces the method nonlinear could evaluate; use --method parametric, or "
             "exugear run"
+        )
+    turning = {body.name for body in gearbox.bodies() if body.carrier is not None}
+    if turning & gearbox.pin_offsets.keys():
+        raise SteadyError(
+            "pins: the method nonlinear does not include displaced planet pins; use --method parametric with "
+            "--mesh-model line_of_action, or exugear run"
         )
 
 

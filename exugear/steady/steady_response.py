@@ -45,7 +45,7 @@ from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.settings import (
     SteadySettings,
     check_law,
-    check_meshes,
+    check_nonlinear,
     check_ring,
     check_speeds,
 )
@@ -325,7 +325,7 @@ def response_of(
     """
     check_speeds(assembly.gearbox, settings.speeds)
     check_law(assembly.mesh_model, settings.method)
-    check_meshes(assembly.gearbox, settings.method)
+    check_nonlinear(assembly.gearbox, settings.method)
     check_ring(assembly, settings.method)
     even = settings.speeds.values
     model = harmonic_balance_model(assembly, even, settings.harmonics, settings.combinations, settings.method, prepared)

@@ -32,7 +32,7 @@ from exugear.steady.settings import (
     SpeedRange,
     SteadySettings,
     check_law,
-    check_meshes,
+    check_nonlinear,
     check_speeds,
     usual_speeds,
 )
@@ -67,7 +67,7 @@ def settings_of_options(
 ) -> SteadySettings:
     """Return the settings that the options state; raise an error if they are invalid for the project."""
     check_law(project.choice.mesh_model, method)
-    check_meshes(project.gearbox, method)
+    check_nonlinear(project.gearbox, method)
     check_speeds(project.gearbox, speeds)
     return SteadySettings(speeds, method, harmonics, branches=branches)
 

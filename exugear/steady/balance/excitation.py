@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import copy
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cached_property
 
 import numpy as np
 
 from exugear.results.sound.radiated_power import RadiatedPower, radiated_power
 from exugear.steady.balance.acting_forces import acting_forces
+from exugear.steady.balance.harmonic_truncation import HarmonicTruncation
 from exugear.steady.balance.interface import Interface, LoadResponse
 from exugear.steady.harmonics.linear_solvers import Batches, batches_of
 from exugear.steady.harmonics.lines import (
@@ -19,7 +20,6 @@ from exugear.steady.harmonics.lines import (
     LineSet,
     TorusSampling,
     beside,
-    count_of_lines,
     joined,
     line_set,
     modulated,
@@ -80,36 +80,6 @@ SHAFT_NEIGHBOURS = 3
 
 Half as many as of the meshes' orders: there are many of them. In the planetary stage of the GRC they change by 1e-6 at
 most with twice as many."""
-MOST_LINES = 500
-"""Combinations up to which lines are looked for: those up to the eighth of three mesh frequencies, the 21st of two."""
-
-
-@dataclass(frozen=True)
-class HarmonicTruncation:
-    """How far a set of lines reaches: harmonics of each mesh frequency, largest sum of multiples of several."""
-
-    harmonics: int
-    combinations: int
-
-    def around(self, lines: LineSet, bases: int, clear: bool) -> HarmonicTruncation:
-        """Return this one, doubled until it has lines of so many bases; combinations up to `MOST_LINES`.
-
-        `clear` asks that none of them is at its edge.
-        """
-        multiples = np.abs(lines.index[:, :bases])
-        alone = np.count_nonzero(multiples, axis=1) == 1
-        sums = multiples.sum(axis=1) + clear
-        harmonics = self.harmonics
-        combinations = self.combinations
-        while sums[alone].max(initial=0) > harmonics:
-            harmonics *= 2
-        while sums[~alone].max(initial=0) > combinations:
-            sooner = combinations
-            later = range(combinations + 1, 2 * combinations + 1)
-            combinations = max((n for n in later if count_of_lines(bases, n) <= MOST_LINES), default=sooner)
-            if combinations == sooner:
-                break
-        return HarmonicTruncation(harmonics, combinations)
 
 
 class HarmonicBalanceModel:
@@ -215,12 +185,14 @@ class HarmonicBalanceModel:
     @cached_property
     def bearing_signals(self) -> Integers:
         """Places (b, 3) of the forces of non-linear bearings among the signals."""
-        axes = np.arange(len(AXES))
         if self.bearings is None:
-            return np.zeros((0, len(axes)), dtype=np.int64)
-        supports = [wave.connectors[wave.wave] for wave in self.bearings.waves]
+            return np.zeros((0, len(AXES)), dtype=np.int64)
+        return self.support_forces(np.array([wave.connectors[wave.wave] for wave in self.bearings.waves]))
+
+    def support_forces(self, supports: Integers) -> Integers:
+        """Places (s, 3) of the forces of supports (s,), by their numbers, among the signals."""
         first = [signal_name.quantity for signal_name in self.signal_names].index("support_force")
-        return np.asarray(first + len(axes) * np.array(supports)[:, None] + axes)
+        return np.asarray(first + len(AXES) * supports[:, None] + np.arange(len(AXES)))
 
     @cached_property
     def bearing_moments(self) -> tuple[Integers, Integers]:
@@ -530,6 +502,20 @@ class HarmonicBalanceModel:
         """Derivative of the forces that curves have without deflection by the position, N per cycle."""
         return self.functions({(DEFLECTION, DEFLECTION): -self._derivative * self.cycle_pulls})
 
+    @cached_property
+    def bends_over_cycle(self) -> tuple[CycleFunctions, CycleFunctions]:
+        """Derivative of the tangents of curves by the deflection, N/m2, and its product with that at the load, N/m.
+
+        A curve of load over deflection is the load times the power m of deflection over that at this load.
+        """
+        waves = self.waves
+        bend = waves.cycle_coefficients("exponent", "tangent", "secant", harmonics=self.harmonics)
+        slope = waves.cycle_coefficients("exponent", "tangent", harmonics=self.harmonics)
+        curved = waves.loads[:, None] > 0.0
+        bend = np.where(curved, bend / np.where(curved, waves.loads[:, None], 1.0), 0.0)
+        key = DEFLECTION, DEFLECTION
+        return self.functions({key: bend}), self.functions({key: np.where(curved, -slope, 0.0)})
+
     @property
     def _derivative(self) -> Complexes:
         """Derivative of harmonics (harmonics + 1,) by the position, 1 per cycle."""
@@ -680,7 +666,7 @@ class HarmonicBalanceModel:
             acting = acting_forces(self.coupling, self.slow_shifts[2], self._displacements)
         stated = np.full(len(acting), bool(self._friction.size))
         if self.shaft_orders.sidebands:
-            places = self._shaft_places.line[self.shaft_orders.reaction.any(axis=1)]
+            places = self._shaft_places.line[self.shaft_orders.has_forces]
             stated[places[places >= 0]] = True
         return batches_of((acting & moving)[1:], stated[1:])
 
@@ -737,6 +723,13 @@ class HarmonicBalanceModel:
         """Deviations (n, m) of gears in the meshes at the lines, at a speed of the input (rad/s), m."""
         return self._displacements if speed > 0.0 else self._displacements.conj()
 
+    def pin_places(self, speed: float) -> Complexes:
+        """Places (n, size) of planets on displaced pins at the lines, in the rotating frame, at a speed (rad/s), m."""
+        orders = self.shaft_orders
+        if not orders.shift.any():
+            return np.zeros((len(self.lines.index), self.system.size), dtype=complex)
+        return at_lines(orders.shift, self._shaft_places, len(self.lines.index), speed)
+
     def _with_friction(self, stated: Complexes, speed: float) -> Complexes:
         """Generalized forces (n, size) of friction and of loads with reactions (n, size + 6 r) at a speed, rad/s."""
         loads = stated[:, : self.system.size].copy()
@@ -746,10 +739,15 @@ class HarmonicBalanceModel:
 
     def with_turned_loads(self, interface: Interface, motion: Complexes) -> Interface:
         """Return the interface with stated loads at the angles to which a motion (n, size) turns their bodies."""
+        static = self.system.static_at(interface.speed)
+        change = self.shaft_orders.change_by_turning(self.sampling, motion, interface.speed, static)
+        return self.with_more_loads(interface, change)
+
+    def with_more_loads(self, interface: Interface, more: Complexes) -> Interface:
+        """Return the interface with loads and reactions (n, size + 6 r) in addition to those of the shafts' orders."""
         speed = interface.speed
         system = self.system
-        change = self.shaft_orders.change_by_turning(self.sampling, motion, speed, system.static_at(speed))
-        loads = self._shaft_loads(speed) + change
+        loads = self._shaft_loads(speed) + more
         pencil = system.stiffness_at(speed), system.damping_at(speed)
         other = self._with_friction(loads, speed)
         still = system.still(pencil[0], other[0].real[:, None])[:, 0]

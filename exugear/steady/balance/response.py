@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -46,6 +47,8 @@ PASSING_TOLERANCE = 1e-6
 """The same where planets pass a flexible ring gear: neighbours that are left out are larger by far."""
 POSITIONS_REPEATED = 2
 """Solutions after the first one, with positions in the mesh cycle that move with the orders of shafts."""
+BEARINGS_REPEATED = 2
+"""Times that forces of bearings of unequally loaded planets follow from the solution before."""
 LARGEST_SHIFT = 0.1
 """Motion of a position, mesh cycles, above which forces are not linear in it: it is neglected there.
 
@@ -76,18 +79,31 @@ class Response:
     @cached_property
     def motion(self) -> Complexes:
         """Coefficients (n, size) of the motion about the static state, in the rotating frame."""
-        lines, size = self.interface.motion.shape[:2]
-        found = self.interface.motion.reshape(lines, size, -1) @ self.excess.reshape(lines, -1, 1)
-        loads = self.interface.loads
-        if loads is None:
-            return np.asarray(-found[..., 0])
-        return np.asarray(loads.motion - found[..., 0])
+        return _motion(self.interface, self.excess.reshape(len(self.excess), -1))
 
     @property
     def torque(self) -> float:
         """Mean torque of the drive that keeps the speed, N m."""
         torque = self.interface.torque - float(np.sum(self.interface.torque_per_force * self.excess[0].real))
         return torque if self.interface.loads is None else torque + self.interface.loads.torque
+
+
+def _motion(interface: Interface, excess: Complexes) -> Complexes:
+    """Motion (n, size) about the static state under forces (n, m f) beyond the averaged system, and other loads."""
+    lines, size = interface.motion.shape[:2]
+    found = interface.motion.reshape(lines, size, -1) @ excess[..., None]
+    if interface.loads is None:
+        return np.asarray(-found[..., 0])
+    return np.asarray(interface.loads.motion - found[..., 0])
+
+
+def with_unequal_bearings(model: HarmonicBalanceModel, interface: Interface, motion: Complexes) -> Interface:
+    """Return the interface with what bearings of unequally loaded planets have more in a motion (n, size)."""
+    reactions = np.zeros((len(motion), BODY_SIZE * len(model.reacting_excitations)))
+    found = np.zeros_like(motion)
+    for own in model.shaft_orders.bearings:
+        found += own.at(model.lines, model.base_names.index(own.carrier), interface.speed, motion)[0]
+    return model.with_more_loads(interface, np.hstack([found, reactions]))
 
 
 def linear_response(model: HarmonicBalanceModel, interface: Interface) -> Response:
@@ -99,8 +115,10 @@ def linear_response(model: HarmonicBalanceModel, interface: Interface) -> Respon
     """
     excess = transmission_errors(model, interface.ports, interface.speed)
     excess[..., DEFLECTION] += mean_deviation_forces(model, interface.speed)
-    deflection = interface.static[..., DEFLECTION] + _answer(interface, excess)[..., DEFLECTION]
-    return _response(model, interface, deflection, excess, 0)
+    answer = _answer(interface, excess)[..., DEFLECTION]
+    for _ in range(BEARINGS_REPEATED if model.shaft_orders.bearings else 0):
+        interface = with_unequal_bearings(model, interface, _motion(interface, excess.reshape(len(excess), -1)))
+    return _response(model, interface, interface.static[..., DEFLECTION] + answer, excess, 0)
 
 
 def transmission_errors(model: HarmonicBalanceModel, ports: MeshInterface, speed: float) -> Complexes:
@@ -149,57 +167,61 @@ def deviation_forces(
     return forces - beyond.reshape(forces.shape)
 
 
-class MovingPositions:
-    """Forces that meshes have because their positions in the cycle move with the shafts' orders, at one speed.
+class SlowChanges:
+    """Forces that meshes have because the shafts' orders move them, at one speed.
 
-    A change p of the position changes the force by p dF/dpmc. It makes the sidebands of mesh orders that a frequency
-    modulation has.
+    A slow change p of the position in the mesh cycle changes the force by p dF/dpmc, and a slow change of deflection
+    the stiffness of a curve of load over deflection. Both make sidebands of mesh orders.
     """
 
     def __init__(self, model: HarmonicBalanceModel, interface: Interface) -> None:
         ports = interface.ports
         self._model = model
-        self._interface = interface
+        self._ports = ports
+        self._speed = interface.speed
         self._shape = len(model.lines.index), *ports.forces.shape[:2]
-        self._slopes = flat(model.slopes_over_cycle.at(ports, interface.speed))
         self._lines, self._places, self._coupling = model.slow_shifts
         self._products = [wave_products(family, interface.speed) for family in model.families]
         self._rows = np.ascontiguousarray(ports.readings[: self._shape[1], POSITION].T)
+        self._by_position = self._forces_by_deflection(model.slopes_over_cycle, model.pulls_over_cycle)
+        self._by_deflection = self._forces_by_deflection(*model.bends_over_cycle) if model.waves.loads.any() else None
 
-    @cached_property
-    def _pulls(self) -> Complexes | float:
-        """Changes (n, m, f) of the forces that curves have without deflection, N per cycle."""
-        model = self._model
-        if not model.waves.loads.any():
-            return 0.0
-        ports = self._interface.ports
-        pulls = model.pulls_over_cycle
-        return _products_of_constants(model, pulls, ports, self._interface.speed, _everywhere(model, ports))
+    def _forces_by_deflection(self, functions: CycleFunctions, given: CycleFunctions) -> tuple[Any, Complexes | float]:
+        """Functions of the mesh cycle of a deflection as `flat` has them, and forces (n, m, f) of curves without it."""
+        ports = self._ports
+        constants: Complexes | float = 0.0
+        if self._model.waves.loads.any():
+            everywhere = _everywhere(self._model, ports)
+            constants = _products_of_constants(self._model, given, ports, self._speed, everywhere)
+        return flat(functions.at(ports, self._speed)), constants
 
-    def forces(self, deflections: Complexes, excess: Complexes) -> Complexes:
-        """Find the forces (n, m, f) at deflections (n, m) under forces (n, m f) beyond the averaged system, N."""
-        model = self._model
-        interface = self._interface
+    def forces(self, deflections: Complexes, motion: Complexes) -> Complexes:
+        """Find the forces (n, m, f) at deflections (n, m) and a motion (n, size) about the static state, N."""
         found = np.zeros(self._shape, dtype=complex)
-        moving = interface.motion[self._lines].reshape(len(self._lines), self._rows.shape[0], -1)
-        motion = -(moving @ excess[self._lines, :, None])[..., 0]
-        if interface.loads is not None:
-            motion += interface.loads.motion[self._lines]
-        positions = motion @ self._rows
+        along = found.copy()
+        along[..., DEFLECTION] = deflections - self._model.deviations(self._speed)
+        positions = motion[self._lines] @ self._rows
         if (2.0 * np.abs(positions)).sum(axis=0).max(initial=0.0) > LARGEST_SHIFT:
             return found
-        along = np.zeros(self._shape, dtype=complex)
-        along[..., DEFLECTION] = deflections - model.deviations(interface.speed)
-        changes = model.coupling.of_flat(self._slopes, along.reshape(len(along), -1)).reshape(self._shape) + self._pulls
-        shifts = np.concatenate([positions, positions.conj()])
-        functions = []
+        found[..., DEFLECTION] = self._modulated(positions, along, self._by_position)
+        if self._by_deflection is not None:
+            slow = along[self._lines, :, DEFLECTION]
+            along[self._lines] = 0.0
+            found[..., DEFLECTION] += self._modulated(slow, along, self._by_deflection)
+        return found
+
+    def _modulated(self, slow: Complexes, along: Complexes, law: tuple[Any, Complexes | float]) -> Complexes:
+        """Find products (n, m) of slow signals (q, m) of the meshes with forces of a law at deflections (n, m, f)."""
+        functions, given = law
+        changes = self._model.coupling.of_flat(functions, along.reshape(len(along), -1)).reshape(self._shape) + given
+        shifts = np.concatenate([slow, slow.conj()])
+        turned = []
         for group, places, products in zip(self._coupling.groups, self._places, self._products, strict=True):
             own = shifts[:, group.begin : group.begin + products.shape[2]]
             function = np.zeros((len(group.harmonics), group.size, group.size), dtype=complex)
             np.add.at(function[..., : products.shape[3]], places, np.einsum("tvwx,qw->qtvx", products, own))
-            functions.append(function)
-        found[..., DEFLECTION] = self._coupling.of(functions, changes[..., DEFLECTION])
-        return found
+            turned.append(function)
+        return self._coupling.of(turned, changes[..., DEFLECTION])
 
 
 def _everywhere(model: HarmonicBalanceModel, ports: MeshInterface) -> Floats:
@@ -228,7 +250,7 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
 
     The equations y = y_static - G (K y - given) of all lines are solved with readings as lengths, l y. Where gears have
     deviations, the position moves with the orders of their shafts, too: what that adds to the forces is given by the
-    solution before (`MovingPositions`). Without meshes it is the response of the method `linear`.
+    solution before (`SlowChanges`). Without meshes it is the response of the method `linear`.
     """
     if not model.waves.waves:
         return linear_response(model, interface)
@@ -241,7 +263,7 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
     passing = balance.passing
     given = given_forces(model, interface) + deviation_forces(model, interface, passing)
     moved = np.zeros_like(given)
-    positions = MovingPositions(model, interface) if repeated else None
+    slow = SlowChanges(model, interface) if repeated else None
     found = None
     products = 0
     for again in reversed(range(1 + (POSITIONS_REPEATED if repeated else 0))):
@@ -254,8 +276,11 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
         deflection = (found / lengths).reshape(shape)[..., DEFLECTION]
         if before is not None and model.ring is None and _is_settled(found, before):
             break
-        if again and positions is not None:
-            moved = positions.forces(deflection, excess)
+        if again and slow is not None:
+            moved = slow.forces(deflection, _motion(interface, excess))
+        if again and model.shaft_orders.bearings:
+            interface = with_unequal_bearings(model, interface, _motion(interface, excess))
+            still = lengths * interface.static[..., : shape[2]].reshape(shape[0], -1)
         if again and model.ring is not None:
             response = _response(model, interface, deflection, excess.reshape(shape), products)
             shifted = at_mean_positions(model, interface, response)
@@ -385,6 +410,14 @@ def signals(model: HarmonicBalanceModel, response: Response) -> Complexes:
     """Coefficients (n, signals) of all signals of a response, in the order of `HarmonicBalanceModel.signal_names`."""
     interface = response.interface
     of_motion = interface.rows.of(response.motion, interface.frequencies)
+    places = model.pin_places(interface.speed)
+    for own in model.shaft_orders.bearings:
+        carrier = model.base_names.index(own.carrier)
+        more = own.at(model.lines, carrier, interface.speed, response.motion)[1]
+        of_motion[:, model.support_forces(own.supports).ravel()] += more
+    if places.any():  # seats move with them; bearings are not strained
+        moving = [name.quantity == "seat_acceleration" for name in interface.rows.names]
+        of_motion[:, moving] += interface.rows.of(places, interface.frequencies)[:, moving]
     # Rows have the bearings of the mean system; what non-linear ones have beyond it acts on their bodies, too.
     if model.bearings is not None:
         beyond = response.excess[:, len(model.waves.waves) :, : model.bearing_signals.shape[1]]

@@ -20,6 +20,7 @@ import scipy.linalg
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Mesh
 from exugear.steady.harmonics.linear_solvers import Batches, Elimination, elimination, solve_side_by_side
+from exugear.steady.mean_system.displaced_pins import with_equal_pins
 from exugear.steady.mean_system.planet_sets import PlanetSet, SteadyError, planet_sets
 from exugear.steady.mean_system.rotating_frame import RotatingFrame
 from exugear.steady.mean_system.symmetric_carriers import SymmetricCarrier, symmetric_carrier
@@ -211,7 +212,7 @@ def mean_system(assembly: Assembly, speeds: Floats, prepared: Steps | None = Non
     """
     _check(assembly)
     sets = planet_sets(assembly)
-    assembly, spread = _with_equal_planets(assembly, sets)
+    assembly, spread = _with_equal_planets(with_equal_pins(assembly, sets), sets)
     frame = rotating_frame(assembly, sets)
     drive, load = _drive_and_load(assembly)
     low = float(np.min(speeds))
@@ -340,11 +341,6 @@ def _check(assembly: Assembly) -> None:
     if not gearbox.meshes and not gearbox.varying_loads:
         raise SteadyError("the train has no meshes and no [excitations]; add an excitation, or use exugear run")
     _check_ring(assembly, assembly.elastic_bodies)
-    if gearbox.pin_offsets:
-        raise SteadyError(
-            "pins: position errors cause unequal planet loads that rotate with the carrier, which the steady-state "
-            "response cannot treat; remove them, or use exugear run"
-        )
     # Rows of rolling elements must neither pass nor turn against the load that they carry.
     rolling = assembly.connectors.rolling
     bodies = {body.name: body for body in gearbox.bodies()}

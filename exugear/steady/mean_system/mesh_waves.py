@@ -22,6 +22,7 @@ from typing import Literal
 import numpy as np
 
 from exugear.steady.harmonics.lines import Modulator, fourier_coefficients
+from exugear.steady.mean_system.displaced_pins import displaced_carriers
 from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.steady.mean_system.planet_sets import IN_PHASE, PlanetSet, phases_ahead, wave_kinds
 from exugear.steady.mean_system.rotating_frame import RotatingFrame
@@ -371,6 +372,7 @@ def mesh_waves(system: MeanSystem, passing: int = 0, neighbours: int = NEIGHBOUR
     waves: list[MeshWave] = []
     groups = mesh_groups(frame)
     rings = [planets for meshes, planets in groups if planets is not None and frame.ring_waves(meshes[0])]
+    displaced = displaced_carriers(assembly, frame.sets)
     for meshes, planets in groups:
         mesh = assembly.elements[meshes[0]].mesh
         order = frequencies[mesh.name]
@@ -384,7 +386,7 @@ def mesh_waves(system: MeanSystem, passing: int = 0, neighbours: int = NEIGHBOUR
         if planets is None:
             waves.append(MeshWave(mesh.name, mesh.name, *own, 0, 1.0, base, sense, 0.0))
             continue
-        one_by_one = passing or any(planets is own for own in rings)
+        one_by_one = passing or any(planets is own for own in rings) or planets.carrier in displaced
         ahead = phases_ahead(assembly, meshes) or (0.0,) * (len(meshes) if one_by_one else 0)
         count = max(planets.waves if ahead else len(WAVES), frame.waves_of_ring(meshes[0], planets))
         for number, weight in enumerate(planets.norms(count)):

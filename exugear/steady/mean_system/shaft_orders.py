@@ -38,9 +38,11 @@ from exugear.steady.harmonics.lines import (
     fourier_coefficients,
     largest,
 )
+from exugear.steady.mean_system.displaced_pins import displaced_carriers, pin_deflections, pin_places
 from exugear.steady.mean_system.mesh_waves import MeshWaves
 from exugear.steady.mean_system.planet_sets import PlanetSet
 from exugear.steady.mean_system.standing_loads import reactions
+from exugear.steady.mean_system.unequal_bearings import UnequalBearings, unequal_bearings
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.system.kernels.meshes import FRAME
 from exugear.system.kernels.turning import travelling_tangent
@@ -82,6 +84,12 @@ class ShaftOrders:
     reaction: Complexes = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
     """(t, size + 6 r) generalized forces in the rotating frame, by the static forces on deviations and of stated loads,
     these per size at a speed; behind them reactions on fixed bodies, as `reactions` has them."""
+    shift: Complexes = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
+    """(t, size) places in the rotating frame of planets on displaced pins, from which their motion counts, m."""
+    centrifugal: Complexes = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
+    """(t, size) forces of inertia there, N per square of the speed of the input in rad/s."""
+    bearings: tuple[UnequalBearings, ...] = ()
+    """Bearings that planets on displaced pins load unequally."""
     source: tuple[str, ...] = ()
     """(t,) name of the excitation that a term is of; empty for deviations."""
     loads: VaryingLoadArrays = field(default_factory=no_varying_loads)
@@ -106,6 +114,11 @@ class ShaftOrders:
     def has_loads(self) -> bool:
         """Whether any of the terms is a stated load."""
         return bool((self.load >= 0).any())
+
+    @property
+    def has_forces(self) -> Booleans:
+        """Whether a term (t,) has forces beside those of the deviations in the meshes."""
+        return np.asarray(self.reaction.any(axis=1) | self.centrifugal.any(axis=1))
 
     @property
     def highest_load(self) -> float:
@@ -133,7 +146,9 @@ class ShaftOrders:
         # Deviations, whose number of a load is -1, have the factor behind those of all loads.
         angles = found[:, 1] + self.loads.order * (self.angles @ static) if len(found) else found[:, 1]
         factors = np.append(found[:, 0] * np.exp(1j * angles), 1.0)[self.load]
-        return np.asarray(self.reaction * factors[:, None])
+        found_forces = self.reaction * factors[:, None]
+        found_forces[:, : self.centrifugal.shape[1]] += speed**2 * self.centrifugal
+        return np.asarray(found_forces)
 
     def change_by_turning(self, sampling: TorusSampling, motion: Complexes, speed: float, static: Floats) -> Complexes:
         """Find how forces and reactions (lines, size + 6 r) change with the turning of the stated loads' bodies.
@@ -195,7 +210,7 @@ def without_deviations(assembly: Assembly) -> Assembly:
 
 def any_shaft_orders(assembly: Assembly) -> bool:
     """Whether gears have deviations, or loads are stated over the angle of a body."""
-    return bool(assembly.meshes.error_pieces.any() or assembly.gearbox.varying_loads)
+    return bool(assembly.meshes.error_pieces.any() or assembly.gearbox.varying_loads or assembly.gearbox.pin_offsets)
 
 
 def shaft_orders(assembly: Assembly, waves: MeshWaves, moved: Callable[[float], Floats] | None = None) -> ShaftOrders:
@@ -211,6 +226,10 @@ def shaft_orders(assembly: Assembly, waves: MeshWaves, moved: Callable[[float], 
     series = _Series(assembly, waves, moved)
     for meshes, planets in waves.groups:
         series.add_family(meshes, planets)
+    displaced = displaced_carriers(assembly, waves.system.frame.sets)
+    for planets in waves.system.frame.sets:
+        if planets.carrier in displaced:
+            series.add_pins(planets)
     for n in range(len(assembly.gearbox.varying_loads)):
         series.add_load(n)
     return series.found()
@@ -240,6 +259,9 @@ class _Series:
         """Order of each rotation, by its name; those of carriers whose planets mesh out of phase come first."""
         self.displacement: dict[tuple[int, Key], Complexes] = {}
         self.reaction: dict[tuple[int, Key], Complexes] = {}
+        self.shift: dict[tuple[int, Key], Complexes] = {}
+        self.centrifugal: dict[tuple[int, Key], Complexes] = {}
+        self.bearings: list[UnequalBearings] = []
         self.reactions = reactions(assembly)
         self.without_reactions = np.zeros(self.reactions.shape[1])
         self.beside: list[tuple[Key, int | None, int | None]] = []
@@ -281,6 +303,65 @@ class _Series:
             kept = largest(size, NEGLECTED * float(np.linalg.norm(size))) & (size > 0.0)
             self.beside += [(key, base, None) for key, is_kept in zip(sizes, kept, strict=True) if is_kept]
 
+    def add_pins(self, planets: PlanetSet) -> None:
+        """Add what unequally displaced pins of a set give to the deflections of meshes, and centrifugal forces."""
+        families = [meshes for meshes, group in self.waves.groups if group is planets]
+        counts = [sum(wave.first == meshes[0] for wave in self.waves.waves) for meshes in families]
+        most = max((self._most_turns(planets, count) for count in counts), default=0)
+        displaced = np.zeros((most + 1, len(self.waves.waves)), dtype=complex)
+        for meshes, count in zip(families, counts, strict=True):
+            own = [n for n, wave in enumerate(self.waves.waves) if wave.first == meshes[0]]
+            deflections = pin_deflections(self.assembly, self.frame.sets, meshes)
+            _, shapes = self._shapes_over_turn(planets, count)
+            turned = np.fft.fft(np.einsum("snw,n->sw", shapes, deflections), axis=0) / len(shapes)
+            turns = self._most_turns(planets, count) + 1
+            displaced[:turns, own] = -turned[:turns]
+        shift, pushed = self._pin_motion(planets, most)
+        for turn in range(most + 1):
+            key = self._turns(planets, turn)
+            self._add(self.displacement, (DEVIATION, key), displaced[turn])
+            self._add(self.reaction, (DEVIATION, key), self._no_reaction)
+            self._add(self.shift, (DEVIATION, key), shift[turn])
+            self._add(self.centrifugal, (DEVIATION, key), pushed[turn])
+        self._add_bearings(planets, most)
+        # The lateral vibration of central bodies passes the planets' differences: that adds a turn of the carrier.
+        for turn in range(1, most + 2):
+            key = self._turns(planets, turn)
+            self.beside += [(key, None, None)] if turn <= most else []
+            self.beside += [(key, base, reach) for base, reach in enumerate(self._reaches) if reach]
+
+    def _add_bearings(self, planets: PlanetSet, most: int) -> None:
+        """Add what bearings that are not equal have beyond their mean in the static state, up to a turn of the set."""
+        unequal = unequal_bearings(self.assembly, self.waves.system, planets)
+        if unequal is None:
+            return
+        self.bearings.append(unequal)
+        for turn, still in zip(unequal.turns.tolist(), unequal.still, strict=True):
+            if 0 <= turn <= most:
+                pushed = self._no_reaction
+                pushed[unequal.coordinates] = still
+                self._add(self.reaction, (DEVIATION, self._turns(planets, turn)), pushed)
+
+    def _pin_motion(self, planets: PlanetSet, most: int) -> tuple[Complexes, Complexes]:
+        """Places that unequal pins give to planets (t, size) in the rotating frame, by multiples of the carrier's turn.
+
+        The centrifugal forces there follow, N per square of the speed of the input in rad/s.
+        """
+        samples = 2 * most + 1
+        still = np.zeros(self.assembly.size)
+        shifts: list[Floats] = []
+        forces: list[Floats] = []
+        for angle in (2.0 * np.pi * np.arange(samples) / samples).tolist():
+            psi = angle / planets.ratio
+            q = self.frame.state(psi, 0.0, self.waves.system.static_at(self.speed))[0]
+            place = pin_places(self.assembly, planets, angle)
+            by_place = self.assembly.inertia_forces(q, still, place) - self.assembly.inertia_forces(q, still, still)
+            frame = self.frame.matrices(psi)[0]
+            shifts.append(np.asarray(np.linalg.solve(frame, place), dtype=np.float64))
+            forces.append(planets.ratio**2 * by_place @ frame)
+        of_shifts, of_forces = (np.fft.fft(np.array(values), axis=0) / samples for values in (shifts, forces))
+        return of_shifts, of_forces
+
     def add_load(self, number: int) -> None:
         """Add a stated load, which varies with the angle of a body."""
         load = self.assembly.gearbox.varying_loads[number]
@@ -297,6 +378,11 @@ class _Series:
             self._add(self.reaction, (number, key), turned)
             self.beside.append((key, None, None))
             self.beside += [(key, base, reach) for base, reach in enumerate(self._reaches) if reach]
+
+    @property
+    def _no_reaction(self) -> Complexes:
+        """Forces and reactions of nothing, (size + 6 r,)."""
+        return np.zeros(self.assembly.size + len(self.without_reactions), dtype=complex)
 
     @cached_property
     def _turned_by_passing(self) -> Floats:
@@ -362,19 +448,24 @@ class _Series:
         if not self.displacement:
             return ShaftOrders()
         loads = self.assembly.gearbox.varying_loads
+        none = np.zeros(self.assembly.size, dtype=complex)
+        terms = list(self.displacement)
         return ShaftOrders(
-            tuple(Rotation(name, self.orders[name]) for name in names[carriers:]),
-            tuple(Sidebands(row(key)[meshes:], base, reach) for key, base, reach in self.beside),
-            np.array([row(key) for _, key in self.displacement], dtype=np.int64),
-            np.array(list(self.displacement.values())),
-            np.array([self.reaction[term] for term in self.displacement]),
-            tuple("" if n == DEVIATION else loads[n].excitation for n, _ in self.displacement),
-            self.assembly.varying_loads,
-            np.array([n for n, _ in self.displacement], dtype=np.int64),
-            np.array([self.frame.speeds.get(load.body, 0.0) for load in loads]),
-            self.frame.matrices(0.0)[0][self.assembly.varying_loads.turning],
-            np.array([any(load.body in planets.names for planets in self.frame.sets) for load in loads], dtype=bool),
-            self.assembly.meshes.error_pieces,
+            rotations=tuple(Rotation(name, self.orders[name]) for name in names[carriers:]),
+            sidebands=tuple(Sidebands(row(key)[meshes:], base, reach) for key, base, reach in self.beside),
+            multiples=np.array([row(key) for _, key in terms], dtype=np.int64),
+            displacement=np.array(list(self.displacement.values())),
+            reaction=np.array([self.reaction[term] for term in terms]),
+            shift=np.array([self.shift.get(term, none) for term in terms]),
+            centrifugal=np.array([self.centrifugal.get(term, none) for term in terms]),
+            bearings=tuple(self.bearings),
+            source=tuple("" if n == DEVIATION else loads[n].excitation for n, _ in terms),
+            loads=self.assembly.varying_loads,
+            load=np.array([n for n, _ in terms], dtype=np.int64),
+            speeds=np.array([self.frame.speeds.get(load.body, 0.0) for load in loads]),
+            angles=self.frame.matrices(0.0)[0][self.assembly.varying_loads.turning],
+            on_planet=np.array([any(load.body in own.names for own in self.frame.sets) for load in loads], dtype=bool),
+            error_pieces=self.assembly.meshes.error_pieces,
         )
 
     def _wheel(self, mesh: int, end: int) -> tuple[str, int]:
@@ -433,17 +524,26 @@ class _Series:
         angles = self._angles(mesh, end)
         if planets is None:
             return [(0, np.ones(1), self._row(angles, 0.0).astype(complex))]
-        most = max(planets.waves, waves) // 2
-        samples = 2 * (2 * most + 1)
+        turned, shapes = self._shapes_over_turn(planets, waves)
+        rows = [self._row(angles, angle / planets.ratio) for angle in turned.tolist()]
+        of_shapes = np.fft.fft(shapes[:, place], axis=0) / len(turned)
+        of_rows = np.fft.fft(rows, axis=0) / len(turned)
+        most = self._most_turns(planets, waves)
+        return [(turn, of_shapes[turn], of_rows[turn]) for turn in range(-most, most + 1)]
+
+    def _most_turns(self, planets: PlanetSet, waves: int) -> int:
+        """Find the highest multiple of the carrier's angle in the shapes of planets whose meshes have some waves."""
+        return max(planets.waves, waves) // 2
+
+    def _shapes_over_turn(self, planets: PlanetSet, waves: int) -> tuple[Floats, Floats]:
+        """Angles (s,) of the carrier, rad, and the share in waves of the mesh of each planet there (s, n, waves)."""
+        samples = 2 * (2 * self._most_turns(planets, waves) + 1)
         turned = 2.0 * np.pi * np.arange(samples) / samples
         # A flexible ring has more waves than planets: as many as planets give any deviation at these.
         values = planets.values(turned)[:, :, :waves]
-        shapes = np.zeros((samples, waves))
-        shapes[:, : values.shape[2]] = values[:, place] / (values[0] ** 2).sum(axis=0)
-        rows = [self._row(angles, angle / planets.ratio) for angle in turned]
-        of_shapes = np.fft.fft(shapes, axis=0) / samples
-        of_rows = np.fft.fft(rows, axis=0) / samples
-        return [(turn, of_shapes[turn], of_rows[turn]) for turn in range(-most, most + 1)]
+        shapes = np.zeros((samples, planets.waves, waves))
+        shapes[..., : values.shape[2]] = values / (values[0] ** 2).sum(axis=0)
+        return turned, shapes
 
     def _relative(self, body: str, frame: str) -> float:
         """Spin of a body against its frame over the spin of the input."""
@@ -467,6 +567,10 @@ class _Series:
             same = math.copysign(1.0, before[1] * planets.ratio)
             rotations[name] = turn + int(same) * before[0], planets.ratio
         return self._multiples(rotations)
+
+    def _turns(self, planets: PlanetSet, turn: int) -> Key:
+        """Multiple of the rotation of the carrier of planets."""
+        return self._multiples({self._carrier(planets): (turn, planets.ratio)} if turn else {})
 
     def _multiples(self, rotations: Mapping[str, tuple[int, float]]) -> Key:
         """Multiples of rotations, given with the speed of each over that of the input; a new one becomes a base."""

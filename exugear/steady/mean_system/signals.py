@@ -118,7 +118,7 @@ def signal_rows(system: MeanSystem, speed: float) -> SignalRows:
     acceleration = [np.zeros(assembly.size)]
     if assembly.supports:
         q, v, _ = frame.state(0.0, speed, system.static_at(speed))
-        turn, labels = _support_waves(assembly, frame.sets)
+        turn, labels = support_waves(assembly, frame.sets)
         all_by_q = _slopes(lambda step: _loads(assembly, q + step, v), assembly.size, place_step(assembly))
         all_by_v = _slopes(lambda step: _loads(assembly, q, v + step), assembly.size, RATE_STEP)
         count = 3 * len(assembly.supports)
@@ -210,8 +210,11 @@ def _seat_rows(assembly: Assembly) -> Floats:
     return rows
 
 
-def _support_waves(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> tuple[Floats, list[str]]:
-    """Matrix from values along global axes (3 supports,) to waves along radius and tangent, and what they are."""
+def support_waves(assembly: Assembly, sets: tuple[PlanetSet, ...], psi: float = 0.0) -> tuple[Floats, list[str]]:
+    """Matrix from values along global axes (3 supports,) to waves along radius and tangent, and what they are.
+
+    The input has turned by the angle psi, rad.
+    """
     count = len(assembly.supports)
     turn = np.eye(3 * count)
     labels = [f"{support.name} {axis}" for support in assembly.supports for axis in AXES]
@@ -226,10 +229,9 @@ def _support_waves(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> tuple[Flo
             ]
             if len(names) != planets.waves:
                 continue
-            shapes = planets.shapes(0.0)[0]
-            inverse = np.linalg.inv(shapes)
-            c = np.cos(planets.angles)
-            s = np.sin(planets.angles)
+            inverse = np.linalg.inv(planets.shapes(psi)[0])
+            c = np.cos(planets.ratio * psi + planets.angles)
+            s = np.sin(planets.ratio * psi + planets.angles)
             radial = np.stack(
                 [np.stack([c, s, 0 * c], 1), np.stack([-s, c, 0 * c], 1), np.stack([0 * c, 0 * c, 1 + 0 * c], 1)], 1
             )

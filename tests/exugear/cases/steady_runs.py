@@ -62,9 +62,12 @@ def torque_of_vibration(system: MeanSystem, speed: float, frequencies: np.ndarra
 def drive_of(model, response):
     """Torque that keeps the speed, what the vibration takes of it included."""
     own = response.interface
+    # What displaced pins cause at multiples of the carrier's rotation stands still on the carrier: it takes no power.
+    of_pins = model.pin_places(own.speed).any(axis=1)
+    motion = np.where(of_pins[:, None] & (own.frequencies[:, None] > 0.0), 0.0, response.motion)
     return (
         response.torque
-        + torque_of_vibration(model.system, own.speed, own.frequencies, response.motion)
+        + torque_of_vibration(model.system, own.speed, own.frequencies, motion)
         + torque_of_errors(model, response)
         + torque_of_stated_loads(model, response)
     )
@@ -119,7 +122,7 @@ def column_of(observer, name):
 def whole_run(model, response, duration, step, torque, assembly=None):
     """Instants, all signals, and angle of the input of a run in time that starts on a response; its observer."""
     interface = response.interface
-    system, motion = model.system, response.motion
+    system, motion = model.system, response.motion + model.pin_places(interface.speed)
     assembly = assembly or model.waves.assembly
     w = interface.frequencies[1:, None]
     u = system.static_at(interface.speed) + motion[0].real + 2.0 * motion[1:].sum(axis=0).real

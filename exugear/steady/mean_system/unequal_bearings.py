@@ -1,0 +1,172 @@
+"""Bearings of planets whose loads are unequal: what each is stiffer or softer than the mean of its set.
+
+The averaged system has equal planets. Where displaced pins share the load unequally, the tangent of a catalogue bearing
+at its load differs from planet to planet. In the frame of the carrier the difference stands still,
+
+    T'(psi) f(T(psi) u, T(psi) u') = sum_l e^(i l psi) (b_l + A_l u + B_l u'),
+
+so that the static state has forces b_l at multiples of the carrier's rotation, and each line of the response acts on
+those beside it. The differences are small: their forces follow from the solution before.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from exugear.steady.harmonics.lines import LineSet
+from exugear.steady.mean_system.mean_system import RATE_STEP, MeanSystem, place_step
+from exugear.steady.mean_system.planet_sets import PlanetSet
+from exugear.steady.mean_system.signals import support_waves
+from exugear.system.kernels.connectors import ConnectorArrays, add_connector_forces, connector_loads
+from exugear.system.kernels.coordinates import BODY_SIZE
+from exugear.system.system import Assembly
+from fe_ste.tools.arrays import Complexes, Floats, Integers
+
+LEAST = 1e-9
+"""Share of the largest coefficient of a series below which one is zero but for round-off."""
+AXES = 3
+"""Components of a force."""
+
+
+@dataclass(frozen=True, eq=False)
+class UnequalBearings:
+    """Forces of bearings of the planets of one carrier beyond the mean of their set.
+
+    Series over t multiples of the carrier's angle, of c coordinates of the rotating frame and r signals. Values hold
+    where the input turns about +z; where it turns about -z, they are the conjugates.
+    """
+
+    carrier: str
+    sense: int
+    """1 of a carrier that turns as the input does, else -1."""
+    turns: Integers
+    """(t,) multiples of its angle."""
+    coordinates: Integers
+    """(c,) that the bearings connect."""
+    supports: Integers
+    """(s,) numbers of the supports, with three signals each: r = 3 s."""
+    still: Complexes
+    """(t, c) generalized forces in the static state, N and N m."""
+    stiffness: Complexes
+    damping: Complexes
+    """(t, c, c) derivatives of the generalized forces."""
+    signals_still: Complexes
+    """(t, r) forces on their bodies in the static state, as the signals `support_force`, N."""
+    signals_stiffness: Complexes
+    signals_damping: Complexes
+    """(t, r, c) derivatives of these."""
+
+    def at(self, lines: LineSet, carrier: int, speed: float, motion: Complexes) -> tuple[Complexes, Complexes]:
+        """Find generalized forces (n, size) of a motion, and signals (n, r) with those of the static state, at lines.
+
+        Parameters
+        ----------
+        carrier : place of the carrier among the bases
+        speed : of the input, rad/s
+        motion : (n, size) about the static state
+        """
+        shift = np.zeros((len(self.turns), lines.index.shape[1]), dtype=np.int64)
+        shift[:, carrier] = self.sense * self.turns
+        rows = lines.index - shift[:, None, :]
+        places, mirrored = lines.find(rows)
+        moving = motion[places][..., self.coordinates] * (places >= 0)[..., None]
+        moving = np.where(mirrored[..., None], moving.conj(), moving)
+        rates = 1j * abs(speed) * (rows @ lines.bases)[..., None] * moving
+
+        def of(by_place: Complexes, by_rate: Complexes) -> Complexes:
+            slopes = (by_place, by_rate) if speed > 0.0 else (by_place.conj(), by_rate.conj())
+            return np.asarray(sum(np.einsum("tab,tnb->na", a, x) for a, x in zip(slopes, (moving, rates), strict=True)))
+
+        forces = np.zeros_like(motion)
+        forces[:, self.coordinates] = of(self.stiffness, self.damping)
+        signals = of(self.signals_stiffness, self.signals_damping)
+        places, mirrored = lines.find(shift)
+        there = (places >= 0) & ~mirrored
+        still = self.signals_still if speed > 0.0 else self.signals_still.conj()
+        np.add.at(signals, places[there], still[there])
+        forces[0], signals[0] = forces[0].real, signals[0].real
+        return forces, signals
+
+
+def unequal_bearings(assembly: Assembly, system: MeanSystem, planets: PlanetSet) -> UnequalBearings | None:
+    """Find what the bearings of a set of planets have beyond their mean; None where they are equal.
+
+    Parameters
+    ----------
+    assembly : with bearings as they are
+    system : its averaged system
+    """
+    frame = system.frame
+    numbers = np.flatnonzero([support.body in planets.names for support in assembly.supports])
+    equal = frame.assembly.connectors.chosen(numbers)
+    given = assembly.connectors.chosen(numbers)
+    laws = {name: getattr(given, name) for name in ("stiffness", "damping", "point_strain", "point_load")}
+    if all(np.array_equal(own, getattr(equal, name)) for name, own in laws.items()):
+        return None
+    both = equal._replace(**laws), equal
+    ends = equal.bodies[equal.bodies >= 0]
+    coordinates = np.unique(ends[:, None] + np.arange(BODY_SIZE))
+    samples = 4 * (planets.waves // 2 + 1) + 1
+    angles = 2.0 * np.pi * np.arange(samples) / samples
+    parts = [_beyond_mean(system, both, angle / planets.ratio, coordinates, numbers) for angle in angles.tolist()]
+    count = len(coordinates)
+    series = [np.fft.fft(values, axis=0) / samples for values in zip(*parts, strict=True)]
+    most = samples // 2
+    turns = np.arange(-most, most + 1)
+    still, stiffness, damping = (values[turns] for values in series)
+    sizes = np.abs(stiffness).max(axis=(1, 2))
+    kept = (sizes > LEAST * sizes.max()) | (np.abs(still).max(axis=1) > LEAST * np.abs(still).max())
+    still, stiffness, damping = (values[kept] for values in (still, stiffness, damping))
+    return UnequalBearings(
+        carrier=planets.carrier,
+        sense=int(math.copysign(1.0, planets.ratio)),
+        turns=turns[kept],
+        coordinates=coordinates,
+        supports=numbers,
+        still=still[:, :count],
+        stiffness=stiffness[:, :count],
+        damping=damping[:, :count],
+        signals_still=still[:, count:],
+        signals_stiffness=stiffness[:, count:],
+        signals_damping=damping[:, count:],
+    )
+
+
+def _beyond_mean(
+    system: MeanSystem,
+    both: tuple[ConnectorArrays, ConnectorArrays],
+    psi: float,
+    coordinates: Integers,
+    numbers: Integers,
+) -> tuple[Floats, Floats, Floats]:
+    """Find forces (c + r,) of bearings beyond those of equal ones, and their derivatives (c + r, c) by place and rate.
+
+    At an angle psi of the input (rad), in the static state. Behind generalized forces there are those on the bodies, as
+    the signals have them.
+    """
+    frame = system.frame
+    speed = float(system.speeds[1])
+    u = system.static_at(speed)
+    units = np.eye(system.size)[coordinates]
+    step = place_step(frame.assembly)
+    changes = np.concatenate([0.0 * units[:1], step * units, -step * units])
+    rates = np.concatenate([RATE_STEP * units, -RATE_STEP * units])
+    states = [frame.state(psi, speed, u + change)[:2] for change in changes]
+    states += [frame.state(psi, speed, u, rate)[:2] for rate in rates]
+    q, v = (np.array(values) for values in zip(*states, strict=True))
+    forces = np.zeros((2, *q.shape))
+    for own, connectors in zip(forces, both, strict=True):
+        add_connector_forces(q, v, connectors, own)
+    loads = np.zeros((2, len(q), AXES * len(numbers)))
+    for own, connectors in zip(loads, both, strict=True):
+        own[:] = [-connector_loads(*state, connectors)[:, :AXES].ravel() for state in zip(q, v, strict=True)]
+    entries = (AXES * numbers[:, None] + np.arange(AXES)).ravel()
+    turn = support_waves(frame.assembly, frame.sets, psi)[0][np.ix_(entries, entries)]
+    generalized = ((forces[0] - forces[1]) @ frame.matrices(psi)[0])[:, coordinates]
+    found = np.hstack([generalized, (loads[0] - loads[1]) @ turn.T])
+    count = len(coordinates)
+    ahead, back, faster, slower = (found[1 + n * count : 1 + (n + 1) * count] for n in range(4))
+    return found[0], (ahead - back).T / (2.0 * step), (faster - slower).T / (2.0 * RATE_STEP)

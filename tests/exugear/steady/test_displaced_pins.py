@@ -1,0 +1,273 @@
+"""Displaced planet pins in the steady-state response: load sharing, orders of the carrier, sidebands of mesh orders."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.steady.balance.response import dissipated_and_given, signals
+from exugear.steady.mean_system.planet_sets import SteadyError
+from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.steady.steady_response import response_of
+from exugear.system.build import assemble
+from exugear.system.statics import static_state
+
+from ...optional_libraries import needs_meshio
+from ..cases import gear_trains
+from ..cases.assembled import assembled
+from ..cases.ring import ring_content, write_rim
+from ..cases.steady_runs import apart, column_of, drive_of, rolling, solver_of, whole_run
+
+LATE = {"late": {"body": "planet_1", "tangential_um": 20.0, "radial_um": 8.0}}
+CYCLE = 2.0 * np.pi * np.arange(50) / 50
+SHAPE = 1.0 + 0.08 * np.cos(CYCLE) + 0.03 * np.sin(2 * CYCLE)
+
+
+def train(content, pins=LATE, variant="bushing", shape=SHAPE):
+    gearbox = Gearbox.from_dict(content | {"pins": pins})
+    return assemble(gearbox, Choice(variant), dict.fromkeys(gearbox.pairs, 4e8 * shape))
+
+
+def forces_of_planets(model, response, rolled):
+    """Forces of each family's meshes at all planets, (samples, planets) by the numbers of the meshes, N."""
+    names = [own.name for own in model.signal_names]
+    lines = signals(model, response)
+    speed = response.interface.speed
+    angles = np.outer(np.copysign(1.0, speed) * rolled, model.lines.bases)
+    found = {}
+    for meshes, planets in model.waves.groups:
+        if planets is None:
+            continue
+        waves = [wave for wave in (model.waves.waves[n] for n in model.waves.force_waves) if wave.first == meshes[0]]
+        columns = [names.index(f"mesh_force {wave.name}") for wave in waves]
+        shapes = planets.values(planets.ratio * rolled, len(waves))
+        found[meshes] = np.einsum("snw,sw->sn", shapes, model.lines.values(lines[:, columns], angles))
+    return found
+
+
+def mean_forces(model, response):
+    """Mean force of each mesh of planets, by its name, N: over the mesh cycles, with the carrier at any place."""
+    slow = ~model.lines.index[:, : len(model.waves.base_orders)].any(axis=1)
+    kept = replace(
+        response,
+        force=np.where(slow[:, None], response.force, 0.0),
+        excess=np.where(slow[:, None, None], response.excess, 0.0),
+    )
+    elements = model.waves.assembly.elements
+    return {
+        elements[mesh].mesh.name: float(force)
+        for meshes, forces in forces_of_planets(model, kept, np.array([0.3])).items()
+        for mesh, force in zip(meshes, forces[0], strict=True)
+    }
+
+
+def largest_difference(solver, speed, duration, step, last, assembly):
+    """Largest root mean square difference of the forces of planets' meshes between a run and the response.
+
+    Means are part of it; over the mean force of all meshes of the family.
+    """
+    model = solver.model
+    response = solver.response(speed)
+    torque = drive_of(model, response)
+    time, found, angle, observer = whole_run(model, response, duration, step, torque, assembly)
+    late = time > duration - last
+    mean, rolled = rolling(model, response, time[late], angle[late])
+    apart_by = []
+    for meshes, known in forces_of_planets(model, solver.response(mean), rolled).items():
+        names = [assembly.elements[mesh].mesh.name for mesh in meshes]
+        own = found[late][:, [column_of(observer, f"mesh_force {name}") for name in names]]
+        apart_by.append(np.sqrt(np.mean((own - known) ** 2, axis=0)).max() / abs(own.mean()))
+    return max(apart_by)
+
+
+@pytest.mark.parametrize("planets", [3, 4])
+def test_planets_of_a_stiff_sun_have_the_load_of_the_displacement_times_the_stiffness(planets):
+    """In the variant rigid both meshes of a planet are springs in series between sun and ring, 2e8 N/m together.
+
+    The carrier turns until the sum of all loads is as before.
+    """
+    constant = np.ones(1)
+    content = gear_trains.planetary("ring", planets)
+    forces = []
+    for pins in ({}, {"late": {"body": "planet_1", "tangential_um": 20.0}}):
+        assembly = train(content, pins, "rigid", constant)
+        solver = solver_of(assembly, (50.0, 150.0), "parametric")
+        found = mean_forces(solver.model, solver.response(90.0))
+        forces.append(np.array([found[f"sun_planet_{n + 1}"] for n in range(planets)]))
+    angles = {element.mesh.name: element.mesh.pair.working_pressure_angle for element in assembly.elements}
+    way = 20e-6 * (np.cos(angles["sun_planet_1"]) + np.cos(angles["planet_ring_1"]))
+    alone = np.zeros(planets)
+    alone[0] = -2e8 * way
+    np.testing.assert_allclose(forces[1] - forces[0], alone - alone.mean(), rtol=1e-4)
+
+
+def test_three_planets_of_a_floating_sun_share_the_load_equally():
+    """The sun is held by 2e-4 of a planet's stiffness. With bearings like all others loads differ by half of the mean.
+
+    What is left of the difference falls with the stiffness that holds the sun.
+    """
+    shares = []
+    for radial in (2e4, 2e5, 2e8):
+        content = gear_trains.planetary("ring")
+        for side in ("left", "right"):
+            content["bearings"][f"sun_{side}"]["stiffness"] = gear_trains.HELD | {"radial_N_per_m": radial}
+        solver = solver_of(train(content), (50.0, 150.0), "linear")
+        found = mean_forces(solver.model, solver.response(60.0))
+        loads = np.array([found[f"sun_planet_{n}"] for n in (1, 2, 3)])
+        shares.append(np.ptp(loads) / loads.mean())
+    assert shares[0] < 2e-3
+    assert shares[1] == pytest.approx(10.0 * shares[0], rel=0.1)
+    assert shares[2] > 0.4
+
+
+@pytest.mark.parametrize("planets", [3, 4])
+def test_load_sharing_is_that_of_the_static_state(planets):
+    """At a hundredth of the lowest natural frequency, stiffness constant over the cycle."""
+    assembly = train(gear_trains.planetary("ring", planets), shape=np.ones(1))
+    solver = solver_of(assembly, (0.5, 2.0), "parametric")
+    found = mean_forces(solver.model, solver.response(1.0))
+    q = static_state(assembly).q
+    static = dict(zip(assembly.mesh_names, assembly.mesh_states(q, np.zeros_like(q))[:, 4].tolist(), strict=True))
+    for family in ("sun_planet", "planet_ring"):
+        loads, expected = (np.array([of[f"{family}_{n + 1}"] for n in range(planets)]) for of in (found, static))
+        assert loads.max() / loads.mean() == pytest.approx(expected.max() / expected.mean(), rel=1e-4)
+        assert loads.max() / loads.mean() > 1.1
+
+
+TRAINS = {
+    "ring held": (gear_trains.planetary("ring"), "planet_1", 90.0),
+    "ring held, backwards": (gear_trains.planetary("ring"), "planet_1", -90.0),
+    "sun held": (gear_trains.planetary("sun"), "planet_1", 90.0),
+    "four planets": (gear_trains.planetary("ring", 4), "planet_1", 90.0),
+    "stepped planets": (gear_trains.stepped_planets(), "planet_2", 90.0),
+    "meshing planets": (gear_trains.meshing_planets(), "short_1", 90.0),
+    "two planetary stages": (gear_trains.wind(), "planet_1_1", 3.0),
+}
+
+
+@pytest.mark.validation
+@pytest.mark.parametrize("kind", TRAINS)
+def test_gear_trains_of_every_kind_stay_on_their_steady_state_with_a_displaced_pin(kind):
+    """Constant speed, RK4 at 1/60 kHz, the last half of 1.6 s: all lines of the overall error, each planet's forces.
+
+    The displacement is larger than the deflection of a mesh, which leaves products of both.
+    """
+    content, planet, speed = TRAINS[kind]
+    assembly = train(content, {"late": LATE["late"] | {"body": planet}})
+    solver = solver_of(assembly, tuple(sorted((0.5 * speed, 2.0 * speed))), "parametric")
+    assert any(name.endswith("carrier") or "carrier_1" in name for name in solver.model.base_names)
+    assert apart(solver, speed, 1.6, 1.0 / 60e3, 0.8, assembly)[0] < 2e-3
+    assert largest_difference(solver, speed, 1.6, 1.0 / 60e3, 0.8, assembly) < 1e-3
+
+
+@pytest.mark.validation
+def test_pins_displaced_alike_are_part_of_the_static_state_alone():
+    """They shift the meshes of sun and ring against each other: the first order is half as large again as without."""
+    pins = {f"pin_{n}": {"body": f"planet_{n}", "tangential_um": 20.0, "radial_um": 5.0} for n in (1, 2, 3)}
+    assembly = train(gear_trains.planetary("ring"), pins)
+    solver = solver_of(assembly, (50.0, 150.0), "parametric")
+    assert len(solver.model.base_names) == 1
+    assert apart(solver, 90.0, 0.8, 1.0 / 60e3, 0.4, assembly)[0] < 1e-3
+
+
+def test_pins_that_are_hardly_displaced_change_nothing_else():
+    """A millionth of a micrometre: orders in common are equal to round-off."""
+    found = []
+    for pins in ({}, {"late": {"body": "planet_1", "tangential_um": 1e-6}}):
+        solver = solver_of(train(gear_trains.planetary("ring"), pins), (50.0, 150.0), "parametric")
+        overall = signals(solver.model, solver.response(70.0))[:, 0]
+        orders = np.round(solver.model.lines.orders, 9)
+        found.append(dict(zip(orders.tolist(), overall.tolist(), strict=True)))
+    without, displaced = found
+    assert set(without) < set(displaced)
+    size = max(map(abs, without.values()))
+    assert max(abs(displaced[order] - value) for order, value in without.items()) < 1e-7 * size
+
+
+def test_the_power_of_displaced_pins_is_what_the_dampers_dissipate(grc, stiffness):
+    """Bearings of the planets are unequal, too."""
+    assembly = assemble(grc.varied({"pins": LATE}), Choice("bushing"), stiffness)
+    for level in ("linear", "parametric"):
+        solver = solver_of(assembly, (1.0, 22.5), level)
+        assert solver.model.shaft_orders.bearings
+        taken, given = dissipated_and_given(solver.model, solver.response(10.0))
+        assert taken == pytest.approx(given, rel=1e-5)
+
+
+def test_the_nonlinear_method_is_refused_by_name():
+    settings = SteadySettings(SpeedRange(50.0, 150.0, 4), "nonlinear")
+    with pytest.raises(SteadyError, match=r"pins: the method nonlinear .* use --method parametric"):
+        response_of(train(gear_trains.planetary("ring")), settings)
+
+
+CARRIER = ("plc_a", "plc_b", "lss_a")
+
+
+def lines_of_run(solver, speed, assembly, names):
+    """Lines (n, signals) of a run of 3 s that starts on the response at a speed, and those of the response."""
+    model = solver.model
+    response = solver.response(speed)
+    torque = drive_of(model, response)
+    time, found, angle, observer = whole_run(model, response, 3.0, 1.0 / 120e3, torque, assembly)
+    late = time > 1.0
+    mean, rolled = rolling(model, response, time[late], angle[late])
+    phases = np.outer(rolled, model.lines.orders)
+    columns = np.hstack([np.cos(phases), -np.sin(phases[:, 1:])])
+    layout = observer.layout
+    own = found[late][:, [layout["support_force"].start + place_of(layout, *name.split()[1:]) for name in names]]
+    fit = np.linalg.lstsq(columns, own, rcond=None)[0]
+    count = phases.shape[1]
+    known = signals(model, solver.response(mean))
+    at = [[signal.name for signal in model.signal_names].index(name) for name in names]
+    return fit[1:count] + 1j * fit[count:], 2.0 * known[1:, at]
+
+
+def place_of(layout, support, axis):
+    """Place of a force among those of all supports."""
+    signal = next(own for own in layout.signals if own.name == "support_force")
+    supports, axes = (layout.names[dimension] for dimension in signal.dimensions[1:])
+    return supports.index(support) * len(axes) + axes.index(axis)
+
+
+@pytest.mark.validation
+def test_a_displaced_pin_of_the_gearbox_brings_the_order_of_the_carrier_and_sidebands(grc, stiffness):
+    """Constant speed of 10 rad/s, RK4 at 1/120 kHz, the last 2 of 3 s; one pin displaced by 20 um along the tangent.
+
+    Amplitudes of the forces of bearings of carrier and sun shaft: the order of the carrier, all mesh orders together,
+    and all of their sidebands. Bearings of the planets are stiffer where their load is larger, by up to 0.7 % of the
+    mean: without that, sidebands of the third mesh order are an eighth of those of the run. Twice the carrier's order,
+    a product of two displacements, is 1e-3 of the carrier's, and is left out.
+    """
+    pins = {"late": {"body": "planet_1", "tangential_um": 20.0}}
+    assembly = assemble(grc.varied({"pins": pins}), Choice("bushing"), stiffness)
+    solver = solver_of(assembly, (1.0, 22.5), "parametric")
+    names = [f"support_force {support} {axis}" for support in CARRIER for axis in "xy"]
+    run, known = map(np.abs, lines_of_run(solver, 10.0, assembly, names))
+    index = solver.model.lines.index[1:]
+    slow = (index == [0, 0, 0, 1]).all(axis=1)
+    assert slow.sum() == 1
+    np.testing.assert_allclose(known[slow], run[slow], rtol=3e-4)
+    of_meshes = index[:, :3].any(axis=1)
+    beside = (index[:, 3] != 0) & of_meshes
+    assert np.linalg.norm(known[beside] - run[beside]) < 0.02 * np.linalg.norm(run[beside])
+    assert np.linalg.norm(run[beside]) > 0.1 * np.linalg.norm(run[of_meshes])
+    others = of_meshes & ~beside
+    assert np.linalg.norm(known[others] - run[others]) < 5e-3 * np.linalg.norm(run[others])
+    assert largest_difference(solver, 10.0, 3.0, 1.0 / 120e3, 2.0, assembly) < 5e-4
+
+
+@needs_meshio
+@pytest.mark.validation
+def test_a_displaced_pin_under_a_flexible_ring_gear_stays_on_its_steady_state(grc, stiffness, tmp_path):
+    """The ring is up to 10 mm thinner at two opposite places; RK4 at 1/200 kHz, the last 1.0 of 1.6 s."""
+    content = ring_content(grc, tmp_path)
+    write_rim(tmp_path / "rim.vtu", oval=0.01)
+    gearbox = Gearbox.from_dict(content, str(tmp_path / "stage.toml")).varied({"pins": LATE})
+    assembly = assembled(gearbox, Choice("flexible"), stiffness)
+    solver = solver_of(assembly, (7.0, 9.0), "parametric", 9)
+    assert apart(solver, 8.0, 1.6, 5e-6, 1.0, assembly)[0] < 2e-3
+    assert largest_difference(solver, 8.0, 1.6, 5e-6, 1.0, assembly) < 5e-4
