@@ -106,11 +106,17 @@ def is_excited(data: xr.Dataset) -> bool:
 def _in_time(data: xr.Dataset, options: str = "") -> str:
     """Return what evaluates nonlinear models: the method `nonlinear`, or a run.
 
-    The method has neither deviations of gears nor a flexible ring gear.
+    The method has neither deviations of gears and pins nor a flexible ring gear.
     """
-    if data.attrs.get("ring_carrier") or data.attrs.get("deviating_gears"):
+    if data.attrs.get("ring_carrier") or data.attrs.get("deviating_gears") or _load_sharing(data):
         return f"exugear run{options}"
     return f"{options} --method nonlinear".strip()
+
+
+def _load_sharing(data: xr.Dataset) -> dict[str, float]:
+    """K_gamma of families whose planets are on displaced pins."""
+    found: dict[str, float] = json.loads(str(data.attrs.get("load_sharing", "{}")))
+    return found
 
 
 def _rpm(speed: float) -> str:
@@ -171,6 +177,10 @@ def _models(data: xr.Dataset) -> Iterator[Finding]:
         text += "(2 % of the orders of the GRC off resonances); leave the excitations out (--without NAME) to see its "
         text += "size, or use exugear run"
         yield Finding("warning", text)
+    if sharing := _load_sharing(data):
+        values = ", ".join(f"{value:.3f} of {family}" for family, value in sharing.items())
+        text = f"displaced planet pins: K_gamma = {values} (largest over mean force of the planets' meshes)"
+        yield Finding("note", text, max(sharing.values()))
     apart = float(np.max(np.nan_to_num(data["contact_loss_fraction"].to_numpy()), initial=0.0))
     if apart > 0.0:
         text = f"contact loss for up to {100.0 * apart:.2g} % of the time (included in the mesh model)"

@@ -17,6 +17,7 @@ from exugear.results.sound.levels import a_weighted
 from exugear.results.sound.over_speed import line_frequencies
 from exugear.results.sound.radiated_power import RadiatedPower, equivalent_power
 from exugear.steady.balance.excitation import HarmonicBalanceModel
+from exugear.steady.balance.load_sharing import load_sharing
 from exugear.steady.balance.neighbours import judged_speeds, with_needed_neighbours
 from exugear.steady.balance.nonlinear import HarmonicResidual, Tangent, growth_of_state, turned_balance
 from exugear.steady.balance.response import Response, dissipated_and_given, exchanged_power, signals
@@ -236,6 +237,8 @@ class SteadyResponse(ReprMixin):
     """Largest change of planet bearings' stiffness that made the planets equal, over that stiffness."""
     stiffness_variation: float
     """Largest change of stiffness over the carrier's places, over the stiffness, whose mean counts."""
+    load_sharing: dict[str, float]
+    """Family of meshes and K_gamma of planets on displaced pins, as `load_sharing` has them."""
     harmonics: int
     """Harmonics of each mesh frequency."""
     left_out: Floats
@@ -392,6 +395,7 @@ def response_of(
         neighbours_left_out=neglected,
         planet_spread=model.system.planet_spread,
         stiffness_variation=model.system.variation,
+        load_sharing=load_sharing(model, solved.amplitude, solved.speed),
         harmonics=model.usual_harmonics,
         left_out=model.waves.left_out(model.usual_harmonics),
         change_with_more=math.nan if settings.branches else _change_with_more(solver, solved),

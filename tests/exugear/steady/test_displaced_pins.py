@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import json
 
 import numpy as np
 import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.steady.balance.load_sharing import mean_planet_forces
 from exugear.steady.balance.response import dissipated_and_given, signals
+from exugear.steady.findings import response_findings
+from exugear.steady.mean_system.mesh_waves import wave_name
 from exugear.steady.mean_system.planet_sets import SteadyError
+from exugear.steady.mean_system.signals import PLANET_AXES, support_waves
 from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.steady.steady_file import to_dataset
 from exugear.steady.steady_response import response_of
 from exugear.system.build import assemble
 from exugear.system.statics import static_state
@@ -23,6 +28,7 @@ from ..cases.ring import ring_content, write_rim
 from ..cases.steady_runs import apart, column_of, drive_of, rolling, solver_of, whole_run
 
 LATE = {"late": {"body": "planet_1", "tangential_um": 20.0, "radial_um": 8.0}}
+PLANE = PLANET_AXES[:2]
 CYCLE = 2.0 * np.pi * np.arange(50) / 50
 SHAPE = 1.0 + 0.08 * np.cos(CYCLE) + 0.03 * np.sin(2 * CYCLE)
 
@@ -50,25 +56,41 @@ def forces_of_planets(model, response, rolled):
 
 
 def mean_forces(model, response):
-    """Mean force of each mesh of planets, by its name, N: over the mesh cycles, with the carrier at any place."""
-    slow = ~model.lines.index[:, : len(model.waves.base_orders)].any(axis=1)
-    kept = replace(
-        response,
-        force=np.where(slow[:, None], response.force, 0.0),
-        excess=np.where(slow[:, None, None], response.excess, 0.0),
-    )
-    elements = model.waves.assembly.elements
-    return {
-        elements[mesh].mesh.name: float(force)
-        for meshes, forces in forces_of_planets(model, kept, np.array([0.3])).items()
-        for mesh, force in zip(meshes, forces[0], strict=True)
-    }
+    """Mean forces (planets,) of each family's meshes, N."""
+    lines = 2.0 * signals(model, response)
+    lines[0] *= 0.5
+    return mean_planet_forces(model, lines, response.interface.speed)
+
+
+def bearings_of_planets(model, response, rolled):
+    """Forces of the planets' bearings along radius and tangent (samples, planets, 2), by family, N."""
+    names = [own.name for own in model.signal_names]
+    frame = model.system.frame
+    lines = signals(model, response)
+    # Signals are those about the static state.
+    q, v, _ = frame.state(0.0, response.interface.speed, model.system.static_at(response.interface.speed))
+    turn, labels = support_waves(frame.assembly, frame.sets)
+    first = names.index(f"support_force {labels[0]}")
+    lines[0, first : first + len(labels)] -= turn @ frame.assembly.bearing_loads(q, v)[:, :3].ravel()
+    angles = np.outer(np.copysign(1.0, response.interface.speed) * rolled, model.lines.bases)
+    found = {}
+    for planets in model.system.frame.sets:
+        own = [support for support in model.waves.assembly.supports if support.body in planets.names]
+        for family in dict.fromkeys(support.family for support in own):
+            waves = [wave_name(number, planets.waves) for number in range(planets.waves)]
+            columns = [
+                [names.index(f"support_force {family} {wave} {axis}") for axis in PLANET_AXES[:2]] for wave in waves
+            ]
+            values = model.lines.values(lines[:, np.array(columns)], angles)
+            forces = np.einsum("snw,swa->sna", planets.values(planets.ratio * rolled), values)
+            found[family] = planets, [support.name for support in own if support.family == family], forces
+    return found
 
 
 def largest_difference(solver, speed, duration, step, last, assembly):
-    """Largest root mean square difference of the forces of planets' meshes between a run and the response.
+    """Largest root mean square differences of the forces of planets' meshes and bearings between run and response.
 
-    Means are part of it; over the mean force of all meshes of the family.
+    Means are part of them; over the mean force of all planets of the family.
     """
     model = solver.model
     response = solver.response(speed)
@@ -76,11 +98,20 @@ def largest_difference(solver, speed, duration, step, last, assembly):
     time, found, angle, observer = whole_run(model, response, duration, step, torque, assembly)
     late = time > duration - last
     mean, rolled = rolling(model, response, time[late], angle[late])
+    response = solver.response(mean)
     apart_by = []
-    for meshes, known in forces_of_planets(model, solver.response(mean), rolled).items():
+    for meshes, known in forces_of_planets(model, response, rolled).items():
         names = [assembly.elements[mesh].mesh.name for mesh in meshes]
         own = found[late][:, [column_of(observer, f"mesh_force {name}") for name in names]]
         apart_by.append(np.sqrt(np.mean((own - known) ** 2, axis=0)).max() / abs(own.mean()))
+    layout = observer.layout
+    first = layout["support_force"].start
+    for planets, names, known in bearings_of_planets(model, response, rolled).values():
+        columns = np.array([[first + place_of(layout, name, axis) for axis in "xy"] for name in names])
+        x, y = np.moveaxis(found[late][:, columns], -1, 0)
+        turned = (x + 1j * y) * np.exp(-1j * (planets.ratio * rolled[:, None] + planets.angles))
+        change = turned - known[..., 0] - 1j * known[..., 1]
+        apart_by.append(np.sqrt(np.mean(np.abs(change) ** 2, axis=0)).max() / abs(turned.mean()))
     return max(apart_by)
 
 
@@ -90,19 +121,15 @@ def test_planets_of_a_stiff_sun_have_the_load_of_the_displacement_times_the_stif
 
     The carrier turns until the sum of all loads is as before.
     """
-    constant = np.ones(1)
-    content = gear_trains.planetary("ring", planets)
-    forces = []
-    for pins in ({}, {"late": {"body": "planet_1", "tangential_um": 20.0}}):
-        assembly = train(content, pins, "rigid", constant)
-        solver = solver_of(assembly, (50.0, 150.0), "parametric")
-        found = mean_forces(solver.model, solver.response(90.0))
-        forces.append(np.array([found[f"sun_planet_{n + 1}"] for n in range(planets)]))
+    pins = {"late": {"body": "planet_1", "tangential_um": 20.0}}
+    assembly = train(gear_trains.planetary("ring", planets), pins, "rigid", np.ones(1))
+    solver = solver_of(assembly, (50.0, 150.0), "parametric")
+    found = mean_forces(solver.model, solver.response(90.0))["sun_planet"]
     angles = {element.mesh.name: element.mesh.pair.working_pressure_angle for element in assembly.elements}
     way = 20e-6 * (np.cos(angles["sun_planet_1"]) + np.cos(angles["planet_ring_1"]))
     alone = np.zeros(planets)
     alone[0] = -2e8 * way
-    np.testing.assert_allclose(forces[1] - forces[0], alone - alone.mean(), rtol=1e-4)
+    np.testing.assert_allclose(found - found.mean(), alone - alone.mean(), rtol=1e-4)
 
 
 def test_three_planets_of_a_floating_sun_share_the_load_equally():
@@ -116,8 +143,7 @@ def test_three_planets_of_a_floating_sun_share_the_load_equally():
         for side in ("left", "right"):
             content["bearings"][f"sun_{side}"]["stiffness"] = gear_trains.HELD | {"radial_N_per_m": radial}
         solver = solver_of(train(content), (50.0, 150.0), "linear")
-        found = mean_forces(solver.model, solver.response(60.0))
-        loads = np.array([found[f"sun_planet_{n}"] for n in (1, 2, 3)])
+        loads = mean_forces(solver.model, solver.response(60.0))["sun_planet"]
         shares.append(np.ptp(loads) / loads.mean())
     assert shares[0] < 2e-3
     assert shares[1] == pytest.approx(10.0 * shares[0], rel=0.1)
@@ -133,9 +159,24 @@ def test_load_sharing_is_that_of_the_static_state(planets):
     q = static_state(assembly).q
     static = dict(zip(assembly.mesh_names, assembly.mesh_states(q, np.zeros_like(q))[:, 4].tolist(), strict=True))
     for family in ("sun_planet", "planet_ring"):
-        loads, expected = (np.array([of[f"{family}_{n + 1}"] for n in range(planets)]) for of in (found, static))
-        assert loads.max() / loads.mean() == pytest.approx(expected.max() / expected.mean(), rel=1e-4)
-        assert loads.max() / loads.mean() > 1.1
+        expected = np.array([static[f"{family}_{n + 1}"] for n in range(planets)])
+        np.testing.assert_allclose(found[family], expected, rtol=1e-4)
+        assert expected.max() / expected.mean() > 1.1
+
+
+def test_a_stored_response_states_the_load_sharing_of_displaced_pins():
+    assembly = train(gear_trains.planetary("ring"))
+    data = to_dataset(response_of(assembly, SteadySettings(SpeedRange(20.0, 40.0, 3))))
+    solver = solver_of(assembly, (20.0, 40.0), "parametric")
+    loads = mean_forces(solver.model, solver.response(20.0))["sun_planet"]
+    sharing = json.loads(data.attrs["load_sharing"])
+    assert sharing["sun_planet"] == pytest.approx(loads.max() / loads.mean(), rel=1e-3)
+    (said,) = [finding.text for finding in response_findings(data) if "K_gamma" in finding.text]
+    assert f"{sharing['planet_ring']:.3f} of planet_ring" in said
+    without = to_dataset(
+        response_of(train(gear_trains.planetary("ring"), {}), SteadySettings(SpeedRange(20.0, 40.0, 3)))
+    )
+    assert json.loads(without.attrs["load_sharing"]) == {}
 
 
 TRAINS = {
