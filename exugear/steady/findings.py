@@ -106,9 +106,9 @@ def is_excited(data: xr.Dataset) -> bool:
 def _in_time(data: xr.Dataset, options: str = "") -> str:
     """Return what evaluates nonlinear models: the method `nonlinear`, or a run.
 
-    The method has neither deviations of gears and pins nor a flexible ring gear.
+    The method has neither displaced planet pins nor a flexible ring gear.
     """
-    if data.attrs.get("ring_carrier") or data.attrs.get("deviating_gears") or _load_sharing(data):
+    if data.attrs.get("ring_carrier") or _load_sharing(data):
         return f"exugear run{options}"
     return f"{options} --method nonlinear".strip()
 

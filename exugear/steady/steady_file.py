@@ -175,7 +175,6 @@ def _attributes(response: SteadyResponse) -> dict[str, Any]:
         "near_unconverged_states": ", ".join(meshes_near_unconverged(assembly)),
         "planet_spread": response.planet_spread,
         "ring_carrier": response.ring_carrier,
-        "deviating_gears": ", ".join(sorted(gear for _, gear in assembly.gearbox.deviations)),
         "load_sharing": json.dumps(response.load_sharing),
         "neighbours_left_out": response.neighbours_left_out,
         "stiffness_variation": response.stiffness_variation,

@@ -126,10 +126,20 @@ def test_planets_that_the_frame_cannot_hold_are_refused_with_the_reason(grc, sti
         mesh_waves(mean_system(made, np.array([0.0, 10.0])))
 
 
-def test_pins_out_of_place_are_refused_with_the_reason(grc, stiffness):
+@pytest.mark.parametrize("variant", ["rigid", "bushing"])
+def test_displaced_pins_leave_matrices_that_do_not_change_as_the_carrier_turns(grc, stiffness, variant):
+    """The mean of the displacement, a third of it for all planets, is in the static state; the rest excites.
+
+    Mesh stiffness does not depend on the load here, so that the matrices are those of nominal pins, except for the
+    bearings of the planets, whose mean stiffness under unequal loads is another: 2e-4 of the stiffness.
+    """
+    speeds = np.array([0.0, 10.0])
+    nominal = mean_system(assemble(grc, Choice(variant), stiffness), speeds)
     varied = grc.varied({"pins": {"one": {"body": "planet_1", "tangential_um": 20.0}}})
-    with pytest.raises(SteadyError, match="pins: position errors cause unequal planet loads"):
-        mean_system(assemble(varied, Choice("rigid"), stiffness), np.array([0.0, 10.0]))
+    found = mean_system(assemble(varied, Choice(variant), stiffness), speeds)
+    assert found.variation < 1e-4
+    change = np.linalg.norm(found.stiffness - nominal.stiffness) / np.linalg.norm(nominal.stiffness)
+    assert change < (1e-9 if variant == "rigid" else 1e-3)
 
 
 def test_gears_that_only_roll_are_refused_before_anything_is_linearised(grc, stiffness):
