@@ -108,7 +108,7 @@ def _in_time(data: xr.Dataset, options: str = "") -> str:
 
     The method has neither displaced planet pins nor a flexible ring gear.
     """
-    if data.attrs.get("ring_carrier") or _load_sharing(data):
+    if data.attrs.get("varying_carrier") or _load_sharing(data):
         return f"exugear run{options}"
     return f"{options} --method nonlinear".strip()
 
@@ -207,7 +207,7 @@ def _models(data: xr.Dataset) -> Iterator[Finding]:
 
 def _passing(data: xr.Dataset) -> Iterator[Finding]:
     """Orders of planets that pass a flexible ring gear."""
-    carrier = str(data.attrs.get("ring_carrier", ""))
+    carrier = str(data.attrs.get("varying_carrier", ""))
     if not carrier:
         return
     left_out = float(data.attrs["neighbours_left_out"])

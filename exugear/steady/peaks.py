@@ -141,7 +141,7 @@ def sidebands(data: xr.Dataset, peak: Peak, signal: str = "overall_dte", least: 
     names = [str(name) for name in data["signal"].to_numpy()]
     values: Floats = data["amplitude"].to_numpy()[point, :, names.index(signal)].astype(np.float64)
     # Passing planets are beside what a mesh excites, however many times they pass.
-    of_meshes = np.array([base != data.attrs.get("ring_carrier") for base in bases])
+    of_meshes = np.array([base != data.attrs.get("varying_carrier") for base in bases])
     carrying = int(np.argmax(np.abs(index[centre]) * of_meshes))
     found = []
     for line in range(1, len(index)):

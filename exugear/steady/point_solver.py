@@ -101,7 +101,7 @@ def harmonic_balance_model(
     usual = FEWEST if LAWS[assembly.mesh_model].loses_contact else waves.needed_harmonics()
     count = usual if harmonics is None else harmonics
     moved = None
-    if waves.passing_ring is not None and any_shaft_orders(assembly):
+    if waves.varying_carrier and any_shaft_orders(assembly):
         moved = _passing_motion(HarmonicBalanceModel(waves, count, combinations))
     orders = shaft_orders(assembly, waves, moved)
     if method == "linear":

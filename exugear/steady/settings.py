@@ -20,7 +20,7 @@ from exugear.gearbox.load_cases import (
 )
 from exugear.gearbox.units import RPM
 from exugear.gearbox.versions import STEADY
-from exugear.steady.mean_system.planet_sets import SteadyError
+from exugear.steady.mean_system.planet_sets import SteadyError, planet_sets
 from exugear.system.system import Assembly, input_hash
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
@@ -199,15 +199,24 @@ def check_nonlinear(gearbox: Gearbox, method: Method) -> None:
         )
 
 
-def check_ring(assembly: Assembly, method: Method) -> None:
-    """Refuse methods that do not include the variation of a flexible ring's stiffness under the planets.
+def check_varying(assembly: Assembly, method: Method) -> None:
+    """Refuse methods that do not include stiffness that varies as the carrier turns.
 
     Raises
     ------
     SteadyError
-        The ring gear is flexible, and the method is not ``parametric``.
+        The ring gear is flexible, or planets are not alike, and the method is not ``parametric``.
     """
-    if assembly.travelling.first.size and method != "parametric":
+    if method == "parametric":
+        return
+    if single := [planets for planets in planet_sets(assembly) if planets.is_single]:
+        family = assembly.gearbox.body(single[0].names[0]).family
+        raise SteadyError(
+            f"bodies.{family}: planets that are fewer than three or unequally spaced; the stiffness varies with the "
+            f"carrier angle, which the method {method} does not include; use --method parametric with --mesh-model "
+            "line_of_action, or exugear run"
+        )
+    if assembly.travelling.first.size:
         raise SteadyError(
             f"the ring gear is flexible, and its stiffness under the passing planets varies: the method {method} does "
             "not include that; use --method parametric with --mesh-model line_of_action, or exugear run"

@@ -174,7 +174,7 @@ def _attributes(response: SteadyResponse) -> dict[str, Any]:
         "growth_rate": response.growth_rate,
         "near_unconverged_states": ", ".join(meshes_near_unconverged(assembly)),
         "planet_spread": response.planet_spread,
-        "ring_carrier": response.ring_carrier,
+        "varying_carrier": response.varying_carrier,
         "load_sharing": json.dumps(response.load_sharing),
         "neighbours_left_out": response.neighbours_left_out,
         "stiffness_variation": response.stiffness_variation,

@@ -47,7 +47,7 @@ from exugear.steady.settings import (
     SteadySettings,
     check_law,
     check_nonlinear,
-    check_ring,
+    check_varying,
     check_speeds,
 )
 from exugear.system.system import Assembly
@@ -229,8 +229,8 @@ class SteadyResponse(ReprMixin):
     growth_rate: float
     """Largest growth rate of any disturbance over the speeds, 1/s: of the averaged system at combination resonances of
     two modes and a mesh frequency, and of the points with contact loss."""
-    ring_carrier: str
-    """Carrier whose planets pass a flexible ring gear; empty without one."""
+    varying_carrier: str
+    """Carrier with whose angle stiffness varies: its planets pass a flexible ring gear, or are not alike."""
     neighbours_left_out: float
     """Largest relative change of transmission error and mesh deflections by the orders left out beside others."""
     planet_spread: float
@@ -329,7 +329,7 @@ def response_of(
     check_speeds(assembly.gearbox, settings.speeds)
     check_law(assembly.mesh_model, settings.method)
     check_nonlinear(assembly.gearbox, settings.method)
-    check_ring(assembly, settings.method)
+    check_varying(assembly, settings.method)
     even = settings.speeds.values
     model = harmonic_balance_model(assembly, even, settings.harmonics, settings.combinations, settings.method, prepared)
     solver = PointSolver(model, settings.method)
@@ -391,7 +391,7 @@ def response_of(
         folds=folds,
         branch_ended=ended,
         growth_rate=float(np.fmax.reduce(solved.growth, initial=growth)),
-        ring_carrier=model.ring.planets.carrier if model.ring is not None and model.ring.planets is not None else "",
+        varying_carrier=model.waves.varying_carrier,
         neighbours_left_out=neglected,
         planet_spread=model.system.planet_spread,
         stiffness_variation=model.system.variation,

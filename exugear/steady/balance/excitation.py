@@ -67,7 +67,9 @@ from exugear.steady.mean_system.signals import (
 )
 from exugear.steady.mean_system.standing_loads import gear_load_rows, moment_supports, reacting_excitations
 from exugear.steady.mean_system.tooth_friction import friction_parts, tooth_friction
+from exugear.steady.mean_system.unequal_bearings import UnequalBearings, varying_bearings
 from exugear.system.kernels.coordinates import BODY_SIZE
+from exugear.system.kernels.coordinates import TILT as AXIS_TILT
 from exugear.system.kernels.meshes import SPIN_1
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.registry import LAWS
@@ -76,7 +78,7 @@ from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
 SAMPLES_PER_HARMONIC = 16
 """Minimum samples per mesh period over the harmonics, with contact loss: kinks need more than products of orders."""
 SHAFT_NEIGHBOURS = 3
-"""Multiples of the planet passing frequency by which a flexible ring gear couples orders of shafts to others.
+"""Multiples of the planet passing frequency by which orders of shafts are coupled to others, where stiffness varies.
 
 Half as many as of the meshes' orders: there are many of them. In the planetary stage of the GRC they change by 1e-6 at
 most with twice as many."""
@@ -103,7 +105,7 @@ class HarmonicBalanceModel:
         # Lines of the larger set are kept apart where forces are evaluated in time.
         self._usual = self._reach = HarmonicTruncation(2 * harmonics, 2 * combinations)
         self.lines = self._lines_within(HarmonicTruncation(harmonics, combinations))
-        # Only forces that are evaluated in time need it, and these are not with a flexible ring gear.
+        # Only forces that are evaluated in time need it, and these are not where stiffness varies with the carrier.
         self.larger = self.lines if waves.neighbours else self._lines_within(self._usual, products=True)
         self._least = 0
         # Shared by all that differ in their lines alone.
@@ -278,9 +280,9 @@ class HarmonicBalanceModel:
 
     @cached_property
     def frozen(self) -> HarmonicBalanceModel:
-        """The same with the carriers held at zero angle where a flexible ring gear varies the stiffness; else itself.
+        """The same with the carriers held at zero angle where their angle varies the stiffness; else itself.
 
-        Its modes are those of the gearbox: springs at all places of the ring raise those of the averaged system.
+        Its modes are those of the gearbox: springs at all places of a ring raise those of the averaged system.
         """
         system = self.system.frozen
         return self if system is self.system else self.with_system(system)
@@ -297,26 +299,26 @@ class HarmonicBalanceModel:
         """Orders up to a limit, with the sidebands of planets that mesh out of phase, and the orders of shafts.
 
         With `products`, sums and differences of the orders of two stated loads are among them. `neighbours` is the
-        number of orders that a flexible ring gear adds on either side of each; by default that of the waves.
+        number of orders that varying stiffness adds on either side of each; by default that of the waves.
         """
         waves = self.waves
         lines = line_set(waves.base_orders.tolist(), reach.harmonics, reach.combinations)
         modulators = [planets for _, planets in waves.carriers]
         slow = self.shaft_orders
         sidebands = slow.sidebands + (slow.products if products else ())
-        ring = self.ring
         meshes = len(waves.base_orders)
-        if ring is None or ring.planets is None:
+        planets = next((family.planets for family in self.varying if family.planets is not None), None)
+        if planets is None:
             lines = beside(lines, modulators, 0) if waves.passing else modulated(lines, modulators)
             return with_rotations(lines, slow.rotations, sidebands, meshes, reach.harmonics)
         most = waves.neighbours if neighbours is None else neighbours
-        lines = modulated(lines, modulators, ring.planets.in_steps(most))
-        most = ring.planets.in_steps(min(most, SHAFT_NEIGHBOURS))
+        lines = modulated(lines, modulators, planets.in_steps(most))
+        most = planets.in_steps(min(most, SHAFT_NEIGHBOURS))
         return with_rotations(lines, slow.rotations, sidebands, meshes, reach.harmonics, modulators, most)
 
     @cached_property
     def beside_others(self) -> Booleans:
-        """Lines (n,) that are there because a flexible ring gear couples others to them: passing planets, sidebands."""
+        """Lines (n,) that are there because the carrier's angle couples others to them: passing planets, sidebands."""
         reach = HarmonicTruncation(self._usual.harmonics // 2, self._usual.combinations // 2)
         places = self.lines.find(self._lines_within(reach, neighbours=0).index)[0]
         found = np.ones(len(self.lines.index), dtype=bool)
@@ -479,7 +481,7 @@ class HarmonicBalanceModel:
         if self.shuttles:
             across, _, twice = self.cycle_moments
             found[DEFLECTION, MISALIGNMENT] = found[MISALIGNMENT, DEFLECTION] = -across
-            found[MISALIGNMENT, MISALIGNMENT] = twice + _constant(twice, self.ring_tilting[:, 0])
+            found[MISALIGNMENT, MISALIGNMENT] = twice + _constant(twice, self.varying_tilting[:, 0])
         return found
 
     @cached_property
@@ -489,7 +491,7 @@ class HarmonicBalanceModel:
         means = np.zeros((len(self.waves.waves), forces))
         means[:, DEFLECTION] = self.waves.mean_stiffness
         if self.shuttles:
-            means[:, MISALIGNMENT] = self.ring_tilting[:, 0]
+            means[:, MISALIGNMENT] = self.varying_tilting[:, 0]
         return CycleFunctions(self.waves, self.families, self.cycle_tangents, forces, means)
 
     @cached_property
@@ -530,7 +532,7 @@ class HarmonicBalanceModel:
         return self.functions(spectra)
 
     @cached_property
-    def ring_tilting(self) -> Floats:
+    def varying_tilting(self) -> Floats:
         """`MeshWaves.tilting` of each wave's mesh (m, 3)."""
         return np.asarray(self.waves.tilting[[wave.first for wave in self.waves.waves]])
 
@@ -538,7 +540,7 @@ class HarmonicBalanceModel:
     def cycle_moments_given(self) -> Complexes:
         """Fourier coefficients (m, harmonics + 1) of the moments that the meshes have without deflection, N m."""
         pulls = self.cycle_moments[1] - self.cycle_moments_beyond
-        return np.asarray(pulls - _constant(pulls, self.ring_tilting[:, 2]))
+        return np.asarray(pulls - _constant(pulls, self.varying_tilting[:, 2]))
 
     def pressed(self, static: Floats) -> Floats:
         """Deflections (m,) from where the mean stiffness has no force, at readings (m, r) of the static state, m."""
@@ -550,10 +552,20 @@ class HarmonicBalanceModel:
         return families(self.waves)
 
     @property
-    def ring(self) -> Family | None:
-        """Waves of the meshes of a flexible ring gear; None without one."""
-        rings = [own for own in self.families if own.planets is not None and own.count > own.planets.waves]
-        return rings[0] if rings else None
+    def varying(self) -> tuple[Family, ...]:
+        """Families with more waves than planets, on one carrier: see `MeshWaves.varying_carrier`."""
+        return tuple(own for own in self.families if own.planets is not None and own.count > own.planets.waves)
+
+    @cached_property
+    def varying_bearings(self) -> UnequalBearings | None:
+        """What bearings of planets that are not alike have beyond the averaged system; None without any."""
+        return varying_bearings(self.system)
+
+    @cached_property
+    def _along_bearings(self) -> Floats:
+        """Generalized forces (size, c) of a unit along each coordinate of these bearings."""
+        coordinates = () if self.varying_bearings is None else self.varying_bearings.coordinates
+        return np.eye(self.system.size)[:, list(coordinates)]
 
     @cached_property
     def coupling(self) -> HarmonicCoupling:
@@ -590,9 +602,31 @@ class HarmonicBalanceModel:
             groups.append(Group(family.first, family.count, harmonics))
         return lines, tuple(places), HarmonicCoupling(self.lines, tuple(groups))
 
+    @cached_property
+    def whole_coupling(self) -> HarmonicCoupling:
+        """`coupling`, and behind it that of the bearings' coordinates that vary with the carrier."""
+        bearings = self.varying_bearings
+        if bearings is None:
+            return self.coupling
+        begin = len(self.weights) * self._ports["forces"].shape[2]
+        most = int(np.abs(bearings.turns).max())
+        multiples = turns_of_carrier(most, self.varying[0].carrier, self.lines.index.shape[1])
+        group = Group(begin, len(bearings.coordinates), multiples)
+        return HarmonicCoupling(self.lines, (*self.coupling.groups, group))
+
     def functions(self, spectra: Spectra) -> CycleFunctions:
         """Functions of the mesh cycles by their harmonics, which `coupling` takes at a speed of the input."""
         return CycleFunctions(self.waves, self.families, spectra, self._ports["forces"].shape[2])
+
+    @cached_property
+    def bearing_lengths(self) -> Floats:
+        """What coordinates (c,) of the bearings that vary count as a length, m: tilts by the largest base pitch."""
+        if self.varying_bearings is None:
+            return np.zeros(0)
+        coordinates = self.waves.assembly.coordinates.values()
+        tilts = np.concatenate([index[AXIS_TILT : AXIS_TILT + 2] for index in coordinates])
+        is_tilt = np.isin(self.varying_bearings.coordinates, tilts)
+        return np.where(is_tilt, float(self.lengths[:, POSITION].max()), 1.0)
 
     @cached_property
     def lengths(self) -> Floats:
@@ -636,6 +670,8 @@ class HarmonicBalanceModel:
         pencil = system.stiffness_at(speed), system.damping_at(speed)
         stated = self._shaft_loads(speed)
         other = self._with_friction(stated, speed)
+        of_meshes = loads.shape[1]
+        loads = np.hstack([loads, self._along_bearings])
         still = system.still(pencil[0], np.column_stack([loads, other[0].real]))
         motion = np.zeros((len(frequencies), *loads.shape), dtype=complex)
         motion[0] = still[:-1, :-1]
@@ -648,11 +684,13 @@ class HarmonicBalanceModel:
         return Interface(
             speed=speed,
             frequencies=frequencies,
-            motion=motion.reshape(*motion.shape[:2], *shape),
+            motion=motion[..., :of_meshes].reshape(*motion.shape[:2], *shape),
             ports=ports,
             rows=SignalRows(self._row_names, **rows),
             torque=system.torque_at(speed),
-            torque_per_force=still[-1, :-1].reshape(shape),
+            torque_per_force=still[-1, :of_meshes].reshape(shape),
+            along_bearings=motion[..., of_meshes:],
+            torque_along_bearings=still[-1, of_meshes:-1],
             bearings=self._bearings_at(speed),
             loads=LoadResponse(other, answer, float(still[-1, -1]), stated[:, system.size :]) if has_loads else None,
         )
@@ -662,13 +700,14 @@ class HarmonicBalanceModel:
         """Lines but the mean with the forces that may act there: all of them, or those of `acting_forces`."""
         moving = self._ports["forces"].any(axis=(0, -1)).ravel()  # laws with fewer forces have none in their places
         acting = np.ones((len(self.lines.index), len(moving)), dtype=bool)
-        if moving.size and not self.is_nonlinear and self.ring is None:
+        if moving.size and not self.is_nonlinear and not self.varying:
             acting = acting_forces(self.coupling, self.slow_shifts[2], self._displacements)
         stated = np.full(len(acting), bool(self._friction.size))
         if self.shaft_orders.sidebands:
             places = self._shaft_places.line[self.shaft_orders.has_forces]
             stated[places[places >= 0]] = True
-        return batches_of((acting & moving)[1:], stated[1:])
+        of_bearings = np.ones((len(acting), self._along_bearings.shape[1]), dtype=bool)
+        return batches_of(np.hstack([acting & moving, of_bearings])[1:], stated[1:])
 
     @cached_property
     def _friction(self) -> Complexes:
@@ -769,6 +808,13 @@ class HarmonicBalanceModel:
     def row_of_overall(self, speed: float) -> Floats:
         """Row (size,) of the overall transmission error by the frame's coordinates, m/m and m/rad."""
         return np.asarray(self.system.at(self._rows["by_place"], speed)[0])
+
+
+def turns_of_carrier(most: int, carrier: int, bases: int) -> Integers:
+    """Multiples (2 most + 1, bases) of the bases' angles for functions of the angle of a carrier alone."""
+    found = np.zeros((2 * most + 1, bases), dtype=np.int64)
+    found[:, carrier] = np.arange(-most, most + 1)
+    return found
 
 
 def _constant(cycle: Complexes, values: Floats) -> Complexes:

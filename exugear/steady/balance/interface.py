@@ -10,7 +10,7 @@ import numpy as np
 from exugear.steady.mean_system.bearing_waves import BearingMean
 from exugear.steady.mean_system.mesh_places import DEFLECTION, MeshInterface
 from exugear.steady.mean_system.signals import SignalRows
-from fe_ste.tools.arrays import Complexes, Floats
+from fe_ste.tools.arrays import Complexes, Floats, Integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +56,11 @@ class Interface:
     """(m, f) torque of the drive per steady force, N m/N."""
     bearings: BearingMean | None
     """Nonlinear bearings in the averaged system."""
+    along_bearings: Complexes
+    """(n, size, c) motion under a unit of force along each coordinate of bearings whose stiffness varies with the
+    carrier."""
+    torque_along_bearings: Floats
+    """(c,) torque of the drive per steady unit of these."""
     loads: LoadResponse | None = None
     """Response to loads beside the meshes' forces, if there are any."""
 
@@ -82,6 +87,14 @@ class Interface:
         lines, waves, forces = self.motion.shape[0], *self.motion.shape[2:]
         read = _taken(self.ports.readings[:, :forces], self.motion)
         return np.ascontiguousarray(read).reshape(lines, waves * forces, waves * forces)
+
+    def answers_with(self, coordinates: Integers) -> Complexes:
+        """Return `deflection_per_force` with coordinates of varying bearings behind the laws, (n, m f + c, m f + c)."""
+        if not coordinates.size:
+            return self.deflection_per_force
+        lines, size, waves, forces = self.motion.shape
+        rows = np.vstack([self.ports.readings[:, :forces].reshape(-1, size), np.eye(size)[coordinates]])
+        return _taken(rows, np.concatenate([self.motion.reshape(lines, size, -1), self.along_bearings], axis=2))
 
     @cached_property
     def readings(self) -> Complexes:

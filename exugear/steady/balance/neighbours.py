@@ -1,4 +1,4 @@
-"""Orders beside others that a flexible ring gear makes relevant, chosen by what they carry at some speeds.
+"""Orders beside others that stiffness varying with the carrier makes relevant, chosen by what they carry.
 
 A line acts on those beside it at multiples of the planet passing frequency. Near a mode of ring and housing that is
 lightly damped a dozen of them carry vibration, elsewhere one or two, and most combinations of meshes none. Solutions at
@@ -51,8 +51,7 @@ def with_needed_neighbours(
     model : with the lines of the meshes, of passing planets, and the relevant ones beside them
     changed : largest relative change of overall transmission error and deflections of the meshes by what is left out
     """
-    assert model.ring is not None
-    beside = model.beside_others & np.delete(model.lines.index, model.ring.carrier, axis=1).any(axis=1)
+    beside = model.beside_others & np.delete(model.lines.index, model.varying[0].carrier, axis=1).any(axis=1)
     whole = _vibrations(model, speeds, prepared)
     shares = np.array([np.linalg.norm(values[:, 1:], axis=1) for values in whole])
     shares /= np.linalg.norm(shares[:, 1:], axis=1)[:, None]

@@ -1,6 +1,6 @@
-"""Orders that passing planets couple where their ring gear is flexible.
+"""Orders that passing planets couple where stiffness varies as the carrier turns.
 
-Under a planet a ring is softer or stiffer from place to place. Each mesh of the ring has the deflection
+Under a planet a flexible ring gear is softer or stiffer from place to place. Each mesh of the ring has the deflection
 
     d_n = sum over waves w of d_w s_w(theta_n),   s = 1, cos m theta, sin m theta up to the waves of the ring's motion,
 
@@ -11,22 +11,26 @@ waves act on each other by
 
 and with an even number of N/2, where the wave that alternates from planet to planet takes part. So a line of the
 response acts on those beside it at multiples of the planet passing frequency: by the mean stiffness,
-by the damper of the mesh, and by the harmonics of the stiffness as other waves do. Mean stiffness and damper couple a
-line with its neighbours strongly. Solved exactly for each line and its neighbours, they precondition the equation of
-all lines, which GMRES then solves in a few products, however many neighbours there are.
+by the damper of the mesh, and by the harmonics of the stiffness as other waves do. Planets that are not alike are sets
+of one each, N = 1, whose meshes have the waves of the other gear's motion: mean, cosine and sine. Their bearings on the
+carrier vary in the same way (`exugear.steady.mean_system.unequal_bearings`).
+
+Mean stiffness and damper couple a line with its neighbours strongly. Solved exactly for each line and its neighbours,
+they precondition the equation of all lines, which GMRES then solves in a few products, however many neighbours there
+are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from exugear.steady.balance.excitation import HarmonicBalanceModel
+from exugear.steady.balance.excitation import HarmonicBalanceModel, turns_of_carrier
 from exugear.steady.balance.interface import Interface
 from exugear.steady.harmonics.lines import Group, HarmonicCoupling
-from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, CycleFunctions, Family
+from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, CycleFunctions
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
 
 
@@ -38,19 +42,21 @@ class SolvedGroups(NamedTuple):
     mirrored: Booleans
     """(g, n) whether a line is taken in as its conjugate."""
     inverse: Complexes
-    """(g, n s, n s) of the equation of the ring's readings."""
+    """(g, n s, n s) of the equation of the readings that vary."""
     forces: Complexes
-    """(g, n s, n s) forces of the ring's waves by these readings."""
+    """(g, n s, n s) forces along these readings."""
     answers: Complexes
     """(g, n, k, s) all readings under a unit of each of these forces."""
 
 
 class PassingPlanets:
-    """Coupling of lines by a flexible ring gear at one speed; n lines, k readings of all waves, s of the ring's.
+    """Coupling of lines by stiffness that varies with the carrier at one speed; n lines, k readings, s that vary.
+
+    Readings are those of all meshes, and behind them coordinates of the bearings that vary.
 
     Parameters
     ----------
-    functions : (q, s, s) stiffness of the ring's waves beyond its mean, as `CycleFunctions` has it
+    functions : (q, s, s) by group of `HarmonicBalanceModel.whole_coupling`: stiffness beyond the averaged system
     answers : (n, k, k) readings of each line under a unit of each force
     lengths : (k,) what a reading counts as a length; readings are given as lengths
     """
@@ -59,50 +65,58 @@ class PassingPlanets:
         self,
         model: HarmonicBalanceModel,
         interface: Interface,
-        functions: Complexes,
+        functions: Sequence[Complexes],
         answers: Complexes,
         lengths: Floats,
     ) -> None:
-        family = model.ring
-        assert family is not None
-        forces = interface.ports.forces.shape[1]
-        self._waves = slice(forces * family.first, forces * (family.first + family.count))
         self._lines = model.lines
-        dampers = {(DEFLECTION, DEFLECTION): model.waves.damping[:, None].astype(np.complex128)}
-        if model.shuttles:
-            dampers[MISALIGNMENT, MISALIGNMENT] = model.ring_tilting[:, 1:2].astype(np.complex128)
-        functions_of_dampers = CycleFunctions(model.waves, [family], dampers, forces)
-        (of_damper,) = functions_of_dampers.at(interface.ports, interface.speed)
-        of_damper /= lengths[self._waves]
-        of_damper[family.turns] = 0.0  # the mean is in the averaged system
-        self._of_damper = of_damper
-        partners = np.kron(model.partners[family.waves, family.waves], np.eye(forces))
-        self._carried = interface.speed * partners
         self._frequencies = interface.frequencies
-        self._coupling = HarmonicCoupling(model.lines, (_turns(family, len(partners), model.lines.index.shape[1]),))
-        mean = functions.reshape(-1, 2 * family.turns + 1, *functions.shape[1:])
-        self._solved_groups = tuple(self._groups(family, mean[len(mean) // 2], answers))
+        planets = model.varying[0].planets
+        assert planets is not None
+        self._step = planets.passing
+        self._carrier = model.varying[0].carrier
+        parts = _varying_parts(model, interface, functions)
+        self._turns = max(len(stiffness) for _, stiffness, _ in parts) // 2
+        self._at = np.concatenate([np.arange(own.start, own.stop) for own, _, _ in parts])
+        stiffness, of_damper = np.zeros((2, 2 * self._turns + 1, len(self._at), len(self._at)), dtype=complex)
+        first = 0
+        for place, of_place, of_rate in parts:
+            own = slice(first, first + place.stop - place.start)
+            turns = slice(self._turns - len(of_place) // 2, self._turns + len(of_place) // 2 + 1)
+            stiffness[turns, own, own] = of_place
+            of_damper[turns, own, own] = of_rate / lengths[place]
+            first = own.stop
+        of_damper[self._turns] = 0.0  # the mean is in the averaged system
+        self._of_damper = of_damper
+        forces = interface.ports.forces.shape[1]
+        partners = np.zeros((len(lengths),) * 2)
+        of_meshes = forces * len(model.weights)
+        partners[:of_meshes, :of_meshes] = np.kron(model.partners, np.eye(forces))
+        self._carried = interface.speed * partners[np.ix_(self._at, self._at)]
+        bases = model.lines.index.shape[1]
+        group = Group(0, len(self._at), turns_of_carrier(self._turns, self._carrier, bases))
+        self._coupling = HarmonicCoupling(model.lines, (group,))
+        self._solved_groups = tuple(self._groups(stiffness, answers))
 
     def damper_forces(self, readings: Complexes) -> Complexes:
-        """Return the forces (n, k) of the meshes' dampers beyond those of the averaged system, from readings (n, k)."""
-        own = readings[:, self._waves]
+        """Return the forces (n, k) of dampers beyond those of the averaged system, from readings (n, k)."""
+        own = readings[:, self._at]
         rates = 1j * self._frequencies[:, None] * own + own @ self._carried.T
         found = np.zeros_like(readings)
-        found[:, self._waves] = self._coupling.of([self._of_damper], rates)
+        found[:, self._at] = self._coupling.of([self._of_damper], rates)
         return found
 
-    def _groups(self, family: Family, stiffness: Complexes, answers: Complexes) -> Iterator[SolvedGroups]:
+    def _groups(self, stiffness: Complexes, answers: Complexes) -> Iterator[SolvedGroups]:
         """Solve the groups of lines with their neighbours, in which the mesh cycle does not vary, by their size.
 
-        `stiffness` (2 turns + 1, s, s) couples the ring's signals at multiples of the carrier's angle.
+        `stiffness` (2 turns + 1, s, s) couples readings at multiples of the carrier's angle.
         """
-        assert family.planets is not None
         index = self._lines.index
-        step = family.planets.passing
+        step = self._step
         passing = np.zeros(index.shape[1], dtype=np.int64)
-        passing[family.carrier] = step
-        first = self._first_of_groups(family)
-        reach = 2 * int(np.abs(index[:, family.carrier]).max()) // step
+        passing[self._carrier] = step
+        first = self._first_of_groups()
+        reach = 2 * int(np.abs(index[:, self._carrier]).max()) // step
         rows = index[first, None, :] + np.arange(-reach, reach + 1)[:, None] * passing
         places, mirrored = self._lines.find(rows)
         speed = self._frequencies[-1] / self._lines.orders[-1]
@@ -112,18 +126,17 @@ class PassingPlanets:
             group, member = (at.reshape(-1, size) for at in np.nonzero((places >= 0) & (sizes == size)[:, None]))
             own = places[group, member], mirrored[group, member]
             apart = step * (member[:, :, None] - member[:, None, :])
-            yield self._solved(family, stiffness, answers, own, frequencies[group, member], apart)
+            yield self._solved(stiffness, answers, own, frequencies[group, member], apart)
 
-    def _first_of_groups(self, family: Family) -> Integers:
+    def _first_of_groups(self) -> Integers:
         """First line of each group: lines are alike but for planet passages, those turned round among them."""
-        assert family.planets is not None
         lines = self._lines
         units = lines.index @ lines.units
-        column = int(np.flatnonzero(lines.units[family.carrier])[0])
+        column = int(np.flatnonzero(lines.units[self._carrier])[0])
         turns = units[:, column].copy()
         units[:, column] = 0
         leading = units[np.arange(len(units)), np.argmax(units != 0, axis=1)]
-        step = family.planets.passing
+        step = self._step
         turns = np.where(leading < 0, -turns, turns) % step
         turns = np.where(leading == 0, np.minimum(turns, -turns % step), turns)
         keys = np.column_stack([np.where(leading < 0, -1, 1)[:, None] * units, turns])
@@ -131,7 +144,6 @@ class PassingPlanets:
 
     def _solved(
         self,
-        family: Family,
         stiffness: Complexes,
         answers: Complexes,
         lines: tuple[Integers, Booleans],
@@ -142,14 +154,14 @@ class PassingPlanets:
         places, mirrored = lines
         groups, members = places.shape
         count = stiffness.shape[-1]
-        coupled_ones = np.abs(apart) <= family.turns
-        turns = np.where(coupled_ones, apart, 0) + family.turns
+        coupled_ones = np.abs(apart) <= self._turns
+        turns = np.where(coupled_ones, apart, 0) + self._turns
         rates = 1j * frequencies[..., None, None] * np.eye(count) + self._carried
         blocks = stiffness[turns] + self._of_damper[turns] @ rates[:, None]
         blocks *= coupled_ones[..., None, None]
-        found = answers[places][..., self._waves]
+        found = answers[places][..., self._at]
         answering = np.where(mirrored[..., None, None], found.conj(), found)
-        matrix = (answering[:, :, None, self._waves] @ blocks).swapaxes(2, 3).reshape(groups, members * count, -1)
+        matrix = (answering[:, :, None, self._at] @ blocks).swapaxes(2, 3).reshape(groups, members * count, -1)
         inverse = np.linalg.inv(matrix + np.eye(members * count))
         forces = blocks.swapaxes(2, 3).reshape(groups, members * count, -1)
         return SolvedGroups(places, mirrored, inverse, forces, answering)
@@ -159,7 +171,7 @@ class PassingPlanets:
         out = right.copy()
         for group in self._solved_groups:
             given = np.where(group.mirrored[..., None], right[group.lines].conj(), right[group.lines])
-            own = group.inverse @ given[..., self._waves].reshape(len(given), -1, 1)
+            own = group.inverse @ given[..., self._at].reshape(len(given), -1, 1)
             forces = (group.forces @ own).reshape(*given.shape[:2], -1, 1)
             solved = given - (group.answers @ forces)[..., 0]
             out[group.lines[group.mirrored]] = solved[group.mirrored].conj()
@@ -167,9 +179,26 @@ class PassingPlanets:
         return out
 
 
-def _turns(family: Family, size: int, bases: int) -> Group:
-    """Group of the ring's signals alone, which functions of the carrier's angle couple."""
-    turns = np.arange(-family.turns, family.turns + 1)
-    multiples = np.zeros((len(turns), bases), dtype=np.int64)
-    multiples[:, family.carrier] = turns
-    return Group(0, size, multiples)
+def _varying_parts(
+    model: HarmonicBalanceModel, interface: Interface, functions: Sequence[Complexes]
+) -> list[tuple[slice, Complexes, Complexes]]:
+    """Find the readings of each family of meshes and of the bearings that vary, and what couples these.
+
+    Stiffness and damping (2 turns + 1, s, s) at multiples of the carrier's angle; readings of the stiffness are lengths.
+    """
+    forces = interface.ports.forces.shape[1]
+    dampers = {(DEFLECTION, DEFLECTION): model.waves.damping[:, None].astype(np.complex128)}
+    if model.shuttles:
+        dampers[MISALIGNMENT, MISALIGNMENT] = model.varying_tilting[:, 1:2].astype(np.complex128)
+    of_dampers = CycleFunctions(model.waves, model.varying, dampers, forces).at(interface.ports, interface.speed)
+    found = []
+    for family, of_damper in zip(model.varying, of_dampers, strict=True):
+        whole = functions[model.families.index(family)]
+        over_cycle = whole.reshape(-1, 2 * family.turns + 1, *whole.shape[1:])
+        readings = slice(forces * family.first, forces * (family.first + family.count))
+        found.append((readings, over_cycle[len(over_cycle) // 2], of_damper))
+    if model.varying_bearings is not None:
+        first = forces * len(model.weights)
+        readings = slice(first, first + len(model.varying_bearings.coordinates))
+        found.append((readings, functions[-1], model.varying_bearings.functions_at(interface.speed)[1]))
+    return found

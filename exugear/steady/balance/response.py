@@ -15,7 +15,7 @@ Deviations of gears are a given displacement in both methods: see `exugear.stead
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -37,7 +37,7 @@ from exugear.steady.mean_system.mesh_places import (
 )
 from exugear.system.kernels.coordinates import BODY_SIZE
 from exugear.system.kernels.meshes import TILT_DAMPING, TILT_STIFFNESS
-from fe_ste.tools.arrays import Complexes, Floats
+from fe_ste.tools.arrays import Complexes, Floats, Integers
 from fe_ste.tools.bundles import cached_bundle
 from fe_ste.tools.octets import SIZE
 
@@ -75,23 +75,31 @@ class Response:
     """(m,) share of time in which teeth are apart."""
     free: Floats
     """(b,) share of time in which no rolling element of a non-linear bearing touches, by law."""
+    of_bearings: Complexes = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
+    """(n, c) forces along coordinates of the bearings that vary with the carrier, beyond the averaged system."""
 
     @cached_property
     def motion(self) -> Complexes:
         """Coefficients (n, size) of the motion about the static state, in the rotating frame."""
-        return _motion(self.interface, self.excess.reshape(len(self.excess), -1))
+        excess = self.excess.reshape(len(self.excess), -1)
+        return _motion(self.interface, np.hstack([excess, self.of_bearings]) if self.of_bearings.size else excess)
 
     @property
     def torque(self) -> float:
         """Mean torque of the drive that keeps the speed, N m."""
         torque = self.interface.torque - float(np.sum(self.interface.torque_per_force * self.excess[0].real))
+        if self.of_bearings.size:
+            torque -= float(self.interface.torque_along_bearings @ self.of_bearings[0].real)
         return torque if self.interface.loads is None else torque + self.interface.loads.torque
 
 
 def _motion(interface: Interface, excess: Complexes) -> Complexes:
-    """Motion (n, size) about the static state under forces (n, m f) beyond the averaged system, and other loads."""
+    """Motion (n, size) about the static state under forces (n, m f + c) beyond the averaged system, and other loads."""
     lines, size = interface.motion.shape[:2]
-    found = interface.motion.reshape(lines, size, -1) @ excess[..., None]
+    of_meshes = interface.motion.reshape(lines, size, -1)
+    found = of_meshes @ excess[:, : of_meshes.shape[2], None]
+    if interface.along_bearings.shape[2]:
+        found = found + interface.along_bearings @ excess[:, of_meshes.shape[2] :, None]
     if interface.loads is None:
         return np.asarray(-found[..., 0])
     return np.asarray(interface.loads.motion - found[..., 0])
@@ -118,7 +126,8 @@ def linear_response(model: HarmonicBalanceModel, interface: Interface) -> Respon
     answer = _answer(interface, excess)[..., DEFLECTION]
     for _ in range(BEARINGS_REPEATED if model.shaft_orders.bearings else 0):
         interface = with_unequal_bearings(model, interface, _motion(interface, excess.reshape(len(excess), -1)))
-    return _response(model, interface, interface.static[..., DEFLECTION] + answer, excess, 0)
+    forces = excess.reshape(len(excess), -1)
+    return _response(model, interface, interface.static[..., DEFLECTION] + answer, forces, 0)
 
 
 def transmission_errors(model: HarmonicBalanceModel, ports: MeshInterface, speed: float) -> Complexes:
@@ -152,7 +161,7 @@ def deviation_forces(
 ) -> Complexes:
     """Find the forces (n, m, f) of the deviations of gears, -k e - c e' with k over the mesh cycle, N and N m.
 
-    `passing` has the dampers of the meshes of a flexible ring gear.
+    `passing` has the dampers of meshes whose stiffness varies with the carrier.
     """
     ports = interface.ports
     forces = np.zeros((len(model.lines.index), *ports.forces.shape[:2]), dtype=complex)
@@ -163,7 +172,8 @@ def deviation_forces(
     forces[..., DEFLECTION] = mean_deviation_forces(model, interface.speed)
     beyond = model.coupling.of(model.tangents_beyond_mean.at(ports, interface.speed), errors.reshape(len(errors), -1))
     if passing is not None:
-        beyond += passing.damper_forces(errors.reshape(len(errors), -1))
+        readings = np.hstack([errors.reshape(len(errors), -1), np.zeros((len(errors), len(model.bearing_lengths)))])
+        beyond += passing.damper_forces(readings)[:, : beyond.shape[1]]
     return forces - beyond.reshape(forces.shape)
 
 
@@ -250,43 +260,70 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
 
     The equations y = y_static - G (K y - given) of all lines are solved with readings as lengths, l y. Where gears have
     deviations, the position moves with the orders of their shafts, too: what that adds to the forces is given by the
-    solution before (`SlowChanges`). Without meshes it is the response of the method `linear`.
+    solution before (`SlowChanges`). Coordinates of bearings that vary with the carrier follow the readings of the
+    meshes. Without meshes it is the response of the method `linear`.
     """
     if not model.waves.waves:
         return linear_response(model, interface)
     shape = len(model.lines.index), *interface.ports.forces.shape[:2]
-    lengths = model.lengths[: shape[1], : shape[2]].ravel()
-    answers = lengths[:, None] * interface.deflection_per_force
-    still = lengths * interface.static[..., : shape[2]].reshape(shape[0], -1)
-    repeated = bool(model.shaft_orders.sidebands) or model.ring is not None
-    balance = LineBalance(model, interface, answers)
+    of_meshes = shape[1] * shape[2]
+    lengths = np.append(model.lengths[: shape[1], : shape[2]].ravel(), model.bearing_lengths)
+    coordinates = _varying_coordinates(model)
+    answers = lengths[:, None] * interface.answers_with(coordinates)
+    still = _still(interface, shape, coordinates, lengths)
+    repeated = bool(model.shaft_orders.sidebands or model.varying)
+    balance = LineBalance(model, interface, answers, lengths)
     passing = balance.passing
+    of_bearings = _static_bearing_forces(model, interface.speed)
     given = given_forces(model, interface) + deviation_forces(model, interface, passing)
     moved = np.zeros_like(given)
     slow = SlowChanges(model, interface) if repeated else None
     found = None
     products = 0
     for again in reversed(range(1 + (POSITIONS_REPEATED if repeated else 0))):
-        whole = (given + moved).reshape(shape[0], -1)
+        whole = np.hstack([(given + moved).reshape(shape[0], -1), of_bearings])
         start = still - (answers @ whole[..., None])[..., 0]
         before = found
         found, more = balance.solve(start, before)
         products += more
         excess = whole + balance.forces(found)
-        deflection = (found / lengths).reshape(shape)[..., DEFLECTION]
-        if before is not None and model.ring is None and _is_settled(found, before):
+        deflection = (found / lengths)[:, :of_meshes].reshape(shape)[..., DEFLECTION]
+        if before is not None and not model.varying and _is_settled(found, before):
             break
         if again and slow is not None:
             moved = slow.forces(deflection, _motion(interface, excess))
         if again and model.shaft_orders.bearings:
             interface = with_unequal_bearings(model, interface, _motion(interface, excess))
-            still = lengths * interface.static[..., : shape[2]].reshape(shape[0], -1)
-        if again and model.ring is not None:
-            response = _response(model, interface, deflection, excess.reshape(shape), products)
+            still = _still(interface, shape, coordinates, lengths)
+        if again and model.varying:
+            response = _response(model, interface, deflection, excess, products)
             shifted = at_mean_positions(model, interface, response)
-            balance = LineBalance(model, shifted, answers, passing)
+            balance = LineBalance(model, shifted, answers, lengths, passing)
             given = given_forces(model, shifted) + deviation_forces(model, shifted, passing)
-    return _response(model, interface, deflection, excess.reshape(shape), products)
+    return _response(model, interface, deflection, excess, products)
+
+
+def _varying_coordinates(model: HarmonicBalanceModel) -> Integers:
+    """Coordinates (c,) of the bearings that vary with the carrier."""
+    return np.zeros(0, dtype=np.int64) if model.varying_bearings is None else model.varying_bearings.coordinates
+
+
+def _still(interface: Interface, shape: tuple[int, ...], coordinates: Integers, lengths: Floats) -> Complexes:
+    """Readings (n, m f + c) of meshes (n, m, f) and bearings' coordinates without forces beyond the averaged system."""
+    found = interface.static[..., : shape[2]].reshape(shape[0], -1)
+    if coordinates.size:
+        loads = interface.loads
+        moved = np.zeros((shape[0], len(coordinates))) if loads is None else loads.motion[:, coordinates]
+        found = np.hstack([found, moved])
+    return lengths * found
+
+
+def _static_bearing_forces(model: HarmonicBalanceModel, speed: float) -> Complexes:
+    """Forces (n, c) in the static state of the bearings that vary with the carrier."""
+    bearings = model.varying_bearings
+    if bearings is None:
+        return np.zeros((len(model.lines.index), 0), dtype=complex)
+    return bearings.still_at(model.lines, model.varying[0].carrier, speed)
 
 
 def _is_settled(found: Complexes, before: Complexes) -> bool:
@@ -305,7 +342,8 @@ class LineBalance:
     Parameters
     ----------
     answers : (n, k, k) readings of each line under a unit of each force, G
-    passing : of a flexible ring gear, at any positions in the mesh cycle; by default it is found
+    lengths : (k,) what a reading counts as a length
+    passing : of stiffness that varies with the carrier, at any positions in the mesh cycle; by default it is found
     """
 
     def __init__(
@@ -313,11 +351,13 @@ class LineBalance:
         model: HarmonicBalanceModel,
         interface: Interface,
         answers: Complexes,
+        lengths: Floats,
         passing: PassingPlanets | None = None,
     ) -> None:
         functions = model.tangents_beyond_mean.at(interface.ports, interface.speed)
-        lengths = model.lengths[: interface.ports.forces.shape[0], : interface.ports.forces.shape[1]].ravel()
-        self._coupling = model.coupling
+        if model.varying_bearings is not None:
+            functions.append(model.varying_bearings.functions_at(interface.speed)[0])
+        self._coupling = model.whole_coupling
         self._functions = [
             function / lengths[group.begin : group.begin + group.size]
             for function, group in zip(functions, self._coupling.groups, strict=True)
@@ -328,9 +368,8 @@ class LineBalance:
         self._memory = self._coupling.memory()
         self._octets = np.empty(2 * SIZE)
         self.passing = passing
-        if model.ring is not None and passing is None:
-            of_ring = self._functions[model.families.index(model.ring)]
-            self.passing = PassingPlanets(model, interface, of_ring, answers, lengths)
+        if model.varying and passing is None:
+            self.passing = PassingPlanets(model, interface, self._functions, answers, lengths)
 
     def _apply(self, readings: Complexes) -> Complexes:
         out = np.empty_like(readings)
@@ -375,7 +414,7 @@ def given_forces(model: HarmonicBalanceModel, interface: Interface) -> Complexes
     products = _products_of_constants(model, model.given, ports, interface.speed, _everywhere(model, ports))
     products[0, :, DEFLECTION] += waves.mean_stiffness * waves.rest
     if model.shuttles:
-        products[0, :, MISALIGNMENT] += model.ring_tilting[:, 2] * [wave.wave == 0 for wave in waves.waves]
+        products[0, :, MISALIGNMENT] += model.varying_tilting[:, 2] * [wave.wave == 0 for wave in waves.waves]
     return products
 
 
@@ -387,15 +426,22 @@ def _answer(interface: Interface, excess: Complexes) -> Complexes:
 
 
 def _response(
-    model: HarmonicBalanceModel, interface: Interface, deflection: Complexes, excess: Complexes, products: int
+    model: HarmonicBalanceModel, interface: Interface, deflection: Complexes, forces: Complexes, products: int
 ) -> Response:
-    """Complete a response with the whole forces of its meshes, those of mean stiffness and damping among them."""
+    """Complete a response with the whole forces of its meshes, those of mean stiffness and damping among them.
+
+    `forces` (n, m f + c) are those beyond the averaged system.
+    """
     waves = model.waves
+    shape = interface.ports.forces.shape[:2]
+    excess = forces[:, : shape[0] * shape[1]].reshape(-1, *shape)
+    of_bearings = forces[:, shape[0] * shape[1] :]
     rates = rates_of(model, interface.speed, deflection)
     force = excess[..., DEFLECTION] + waves.mean_stiffness * deflection + waves.damping * rates
     force[0] -= waves.mean_stiffness * waves.rest
     force *= waves.line_of_action
-    return Response(interface, deflection, excess, force, products, np.zeros(len(waves.waves)), np.zeros(0))
+    apart = np.zeros(len(waves.waves))
+    return Response(interface, deflection, excess, force, products, apart, np.zeros(0), of_bearings)
 
 
 def rates_of(model: HarmonicBalanceModel, speed: float, values: Complexes) -> Complexes:
@@ -411,7 +457,10 @@ def signals(model: HarmonicBalanceModel, response: Response) -> Complexes:
     interface = response.interface
     of_motion = interface.rows.of(response.motion, interface.frequencies)
     places = model.pin_places(interface.speed)
-    for own in model.shaft_orders.bearings:
+    unequal = model.shaft_orders.bearings
+    if model.varying_bearings is not None:
+        unequal = (*unequal, model.varying_bearings)
+    for own in unequal:
         carrier = model.base_names.index(own.carrier)
         more = own.at(model.lines, carrier, interface.speed, response.motion)[1]
         of_motion[:, model.support_forces(own.supports).ravel()] += more
@@ -480,6 +529,8 @@ def dissipated_and_given(model: HarmonicBalanceModel, response: Response) -> tup
     ports = interface.ports
     along = np.tensordot(rates, ports.forces, axes=(1, 2)) * model.weights[:, None]
     given = -2.0 * float(np.sum((response.excess[1:] * along.conj()).real))
+    if response.of_bearings.size:
+        given -= 2.0 * float(np.sum((response.of_bearings[1:] * rates[:, _varying_coordinates(model)].conj()).real))
     if interface.loads is not None:
         given += 2.0 * float(np.sum((interface.loads.loads[1:] * rates.conj()).real))
     return taken, given

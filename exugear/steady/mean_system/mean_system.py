@@ -80,7 +80,7 @@ class MeanSystem(ReprMixin):
     """Largest change of planet bearings' stiffness that makes them equal, over that stiffness."""
     variation: float
     """Largest change of stiffness over the carrier's places, over the stiffness: its mean is taken. What a flexible
-    ring gear brings is left out of it: its meshes are waves around the carrier."""
+    ring gear and planets that are not alike bring is left out of it: their meshes are waves around the carrier."""
     over_angle: tuple[Floats, Floats] | None = None
     """C (p, size, size) and K (3, p, size, size) less those at zero angle of the carrier, at p of its angles that are
     evenly spread over the passing of a planet, or of two; None where they are the mean ones at any angle."""
@@ -95,15 +95,15 @@ class MeanSystem(ReprMixin):
 
     @property
     def frozen(self) -> MeanSystem:
-        """The system with the carriers held at zero angle; itself without a flexible ring gear.
+        """The system with the carriers held at zero angle; itself where stiffness does not vary with their angle.
 
-        The frequencies of the averaged system are higher than those at any angle, by 5 % at most in the GRC, since it
-        has springs all around the ring.
+        The frequencies of the averaged system are higher than those at any angle, by 5 % at most in the GRC with a
+        flexible ring gear, since it has springs all around the ring.
         """
         return next(self.at_angles()) if self.over_angle is not None else self
 
     def at_angles(self) -> Iterator[MeanSystem]:
-        """Systems with the carrier held at the angles of a planet passage; none without a flexible ring gear."""
+        """Systems with the carrier held at the angles of a planet passage; none where stiffness does not vary."""
         if self.over_angle is None:
             return
         dampings, stiffnesses = self.over_angle
@@ -222,8 +222,8 @@ def mean_system(assembly: Assembly, speeds: Floats, prepared: Steps | None = Non
     u = _first_guess(assembly, frame, drive)
     torque = 0.0
     rows = []
-    # The static state of a gearbox with a flexible ring balances the mean over the carrier's places.
-    places = frame.places if frame.has_elastic_ring else np.zeros(1)
+    # Where stiffness varies with the carrier the static state balances the mean over its places.
+    places = frame.places if frame.varies else np.zeros(1)
     matrix = None
     total = len(at) + (len(frame.places) - 1 if sets else 0)
     report = partial(prepared or _unreported, "linearisation")
@@ -243,7 +243,7 @@ def mean_system(assembly: Assembly, speeds: Floats, prepared: Steps | None = Non
         mass = mass + changes[0].mean(axis=0)
         dampings = dampings + changes[1].mean(axis=0)
         stiffnesses = stiffnesses + changes[2].mean(axis=1)
-        if frame.has_elastic_ring:
+        if frame.varies:
             over_angle = changes[1], changes[2]
     pinned = assembly.spin[assembly.gearbox.case.overall.input]
     return MeanSystem(
@@ -286,13 +286,19 @@ def rotating_frame(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> RotatingF
     Raises
     ------
     SteadyError
-        A flexible carrier is not symmetric, or has planets of different numbers.
+        A flexible carrier is not symmetric, or has planets of different numbers; stiffness varies with the angle of
+        several carriers; planets that are not alike have nonlinear bearings.
     """
     carriers: dict[str, SymmetricCarrier] = {}
     for planets in sets:
         body = assembly.elastic_bodies.get(planets.carrier)
         if body is None:
             continue
+        if planets.is_single:
+            raise SteadyError(
+                f"bodies.{planets.carrier}: flexible, with planets that are fewer than three or unequally spaced, "
+                "which the steady-state response cannot treat; set flexibility = 'none', or use exugear run"
+            )
         known = carriers.get(planets.carrier)
         if known is None:
             axis = next(body.axis for body in assembly.bodies if body.name == planets.carrier)
@@ -306,7 +312,29 @@ def rotating_frame(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> RotatingF
         name: replace(body, reduced=carriers[name].body) if name in carriers else body
         for name, body in assembly.elastic_bodies.items()
     }
-    return RotatingFrame(replace(assembly, elastic_bodies=symmetric), sets, tuple(carriers.values()))
+    frame = RotatingFrame(replace(assembly, elastic_bodies=symmetric), sets, tuple(carriers.values()))
+    _check_varying(frame)
+    return frame
+
+
+def _check_varying(frame: RotatingFrame) -> None:
+    """Refuse stiffness that varies with several carriers, or that is not linear."""
+    of_meshes = [frame.planets_of(m) for m in range(len(frame.assembly.elements)) if frame.varies_at(m)]
+    varying = sorted({planets.carrier for planets in of_meshes if planets is not None})
+    if len(varying) > 1:
+        raise SteadyError(
+            f"bodies.{', bodies.'.join(varying)}: stiffness varies with the angles of several carriers (planets "
+            "fewer than three or unequally spaced, or a flexible ring gear), which the steady-state response cannot "
+            "treat; use exugear run"
+        )
+    rows = np.diff(frame.assembly.connectors.rolling.first)
+    for n in frame.varying_bearings:
+        if rows[n]:
+            raise SteadyError(
+                f"bearings.{frame.assembly.supports[n].family}.model = 'iso16281': on planets that are fewer than three "
+                "or unequally spaced, which the steady-state response cannot treat; set model = 'linear', or use "
+                "exugear run"
+            )
 
 
 def unsuitable(assembly: Assembly, elastic: Collection[str] = ()) -> str:
@@ -519,9 +547,9 @@ def _changes_over_places(
     """M and C (places, size, size) and K (3, places, size, size) at the carrier's places less those at the angle zero.
 
     These are given, and so are the static states (3, size) at the speeds. M and C are the same at all speeds. K is
-    linear in the speed where dampers of teeth travel around a flexible ring gear, and else the same. The last result is
-    the largest change of K over the places, over K, without the meshes of a flexible ring gear. `report` is called with
-    the number of each place.
+    linear in the speed where dampers travel around what varies, and else the same. The last result is the largest
+    change of K over the places, over K, without what is known to vary: see `RotatingFrame.without_varying`. `report` is
+    called with the number of each place.
 
     Raises
     ------
@@ -536,7 +564,7 @@ def _changes_over_places(
     largest = 0.0
     curved = any(element.is_curved for element in frame.assembly.elements)
     most = ROWS_VARIATION if frame.assembly.has_rows or curved else VARIATION
-    without = frame.without_elastic_ring
+    without = frame.without_varying
     still = stiffness[1] if without is frame else _stiffness(without, 0.0, speed, u)
     for place, psi in enumerate(places[1:].tolist(), start=1):
         masses[place] = _mass(frame, psi, u) - mass

@@ -8,7 +8,8 @@ g_n of the deflection of mesh n by the frame's coordinates u
 and a force F_n in each mesh is a generalized force -(N g_0 F_0 + N/2 g_c F_c + N/2 g_s F_s). Planets that mesh in phase
 have one position in the mesh cycle, so that their stiffness k multiplies each component by itself. Planets out of phase
 have all N components, and the carrier's angle is a base of its own: harmonic h of the stiffness couples a component to
-another, and its order to a sideband, by a whole number of the carrier's revolutions.
+another, and its order to a sideband, by a whole number of the carrier's revolutions. Planets that are not alike are
+families of one each, with a mean, a cosine and a sine: what the other gear of the mesh does there.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ MAX_NEGLECTED = 2e-2
 With it the ten highest peaks of the GRC and of a spur planetary gearbox agree within 1e-2 with results for 1.5 times as
 many harmonics."""
 NEIGHBOURS = 6
-"""Multiples of the planet passing frequency by which a flexible ring gear couples each order to others, at most.
+"""Multiples of the planet passing frequency by which each order is coupled to others, at most, where stiffness varies.
 
 Those that carry hardly any vibration are left out later (`exugear.steady.balance.neighbours`). With four, main orders
 of the GRC are within 1e-3 of those with twelve at most speeds, with six within 2e-4."""
@@ -147,17 +148,20 @@ class MeshWaves:
                     tuple(sorted(bases)),
                     planets.waves,
                     *_one_of(steps),
-                    planets.passing if planets is self.passing_ring else 0,
+                    planets.passing if name == self.varying_carrier else 0,
                 ),
             )
             for name, (planets, bases, steps) in found.items()
         )
 
     @cached_property
-    def passing_ring(self) -> PlanetSet | None:
-        """Planets that pass a flexible ring gear, whose meshes have more waves than there are planets; None without."""
+    def varying_carrier(self) -> str:
+        """Carrier of planets whose meshes have more waves than there are planets; empty without any.
+
+        They pass a flexible ring gear, or are not alike.
+        """
         of_waves = ((wave, self.planets(wave)) for wave in self.waves)
-        return next((planets for wave, planets in of_waves if planets and wave.wave >= planets.waves), None)
+        return next((planets.carrier for wave, planets in of_waves if planets and wave.wave >= planets.waves), "")
 
     def planets(self, wave: MeshWave) -> PlanetSet | None:
         """Planets of the meshes of a wave, None of a single mesh."""
@@ -246,24 +250,24 @@ class MeshWaves:
         """Position in the mesh cycle of each wave's mesh at zero angle of the input, (m,), cycles."""
         moved = self.position_rows() @ self.system.static_at(speed)
         phases = np.array([self.assembly.meshes.phase[wave.first] for wave in self.waves])
-        mean = {wave.family: float(moved[n]) for n, wave in enumerate(self.waves) if wave.wave == 0}
-        return np.asarray(phases + np.array([mean[wave.family] for wave in self.waves]))
+        mean = {wave.first: float(moved[n]) for n, wave in enumerate(self.waves) if wave.wave == 0}
+        return np.asarray(phases + np.array([mean[wave.first] for wave in self.waves]))
 
     @cached_property
     def tilting(self) -> Floats:
-        """Resistance of the meshes (meshes, 3) of a flexible ring gear to misalignment, 0 for others.
+        """Resistance of meshes (meshes, 3) whose stiffness varies with the carrier to misalignment, 0 for others.
 
         Stiffness (N m/rad), damping (N m s/rad) and constant moment (N m), as in `MeshArrays.tilt`.
         """
         meshes = self.assembly.meshes
-        of_ring = [self.system.frame.ring_waves(m) > 0 for m in range(len(meshes.tilt))]
-        return np.asarray(meshes.tilt[:, [TILT_STIFFNESS, TILT_DAMPING, TILT_MOMENT]] * np.array(of_ring)[:, None])
+        varying = np.array([self.system.frame.varies_at(m) for m in range(len(meshes.tilt))], dtype=bool)
+        return np.asarray(meshes.tilt[:, [TILT_STIFFNESS, TILT_DAMPING, TILT_MOMENT]] * varying[:, None])
 
     @property
     def moving(self) -> Booleans:
         """Meshes (meshes,) whose moment over misalignment is not all in the averaged system.
 
-        Their load shuttles over the cycle, or they move around a flexible ring gear.
+        Their load shuttles over the cycle, or their stiffness varies with the carrier.
         """
         return np.asarray((self.assembly.meshes.way_pieces > 0) | self.tilting.any(axis=1))
 
@@ -337,11 +341,11 @@ class MeshWaves:
     def _waves_of(self, at: Callable[[float], Floats]) -> Floats:
         """Waves (m, ...) of values (meshes, ...), which are a function of the angle of the input, rad.
 
-        Without a flexible ring gear waves are the same at all angles. With one they are a Fourier series around the
-        carrier, from values at places around it.
+        Waves are the same at all angles where nothing varies with the carrier. Elsewhere they are a Fourier series
+        around it, from values at places around it.
         """
         frame = self.system.frame
-        places = frame.places if frame.has_elastic_ring else np.zeros(1)
+        places = frame.places if frame.varies else np.zeros(1)
         return np.asarray(np.mean([self._projected(at(float(psi)), float(psi)) for psi in places], axis=0))
 
     def _projected(self, values: Floats, psi: float) -> Floats:
@@ -371,7 +375,7 @@ def mesh_waves(system: MeanSystem, passing: int = 0, neighbours: int = NEIGHBOUR
     names: list[list[str]] = []
     waves: list[MeshWave] = []
     groups = mesh_groups(frame)
-    rings = [planets for meshes, planets in groups if planets is not None and frame.ring_waves(meshes[0])]
+    varying = [planets for meshes, planets in groups if frame.varies_at(meshes[0])]
     displaced = displaced_carriers(assembly, frame.sets)
     for meshes, planets in groups:
         mesh = assembly.elements[meshes[0]].mesh
@@ -380,28 +384,29 @@ def mesh_waves(system: MeanSystem, passing: int = 0, neighbours: int = NEIGHBOUR
         if base == len(orders):
             orders.append(order)
             names.append([])
-        names[base].append(mesh.family)
+        if mesh.family not in names[base]:
+            names[base].append(mesh.family)
         sense = math.copysign(1.0, _cycles_per_turn(frame, meshes[0]))
         own = (meshes[0],)
         if planets is None:
             waves.append(MeshWave(mesh.name, mesh.name, *own, 0, 1.0, base, sense, 0.0))
             continue
-        one_by_one = passing or any(planets is own for own in rings) or planets.carrier in displaced
+        one_by_one = passing or any(planets is own for own in varying) or planets.carrier in displaced
         ahead = phases_ahead(assembly, meshes) or (0.0,) * (len(meshes) if one_by_one else 0)
-        count = max(planets.waves if ahead else len(WAVES), frame.waves_of_ring(meshes[0], planets))
+        count = max(planets.waves if ahead else len(WAVES), frame.waves_around(meshes[0], planets))
+        name = mesh.name if planets.is_single else mesh.family
         for number, weight in enumerate(planets.norms(count)):
-            label = f"{mesh.family} {wave_name(number, planets.waves)}" if number else mesh.family
+            label = f"{name} {wave_name(number, planets.waves)}" if number else name
             waves.append(MeshWave(label, mesh.family, *own, number, float(weight), base, sense, planets.ratio, ahead))
     found = MeshWaves(system, tuple(waves), np.array(orders), tuple(", ".join(name) for name in names), passing)
-    return found if found.passing_ring is None else replace(found, neighbours=neighbours)
+    return replace(found, neighbours=neighbours) if found.varying_carrier else found
 
 
 def mesh_groups(frame: RotatingFrame) -> tuple[tuple[tuple[int, ...], PlanetSet | None], ...]:
     """Meshes of each family of planets in the order of the planets, and single meshes."""
     found: dict[str, tuple[tuple[int, ...], PlanetSet | None]] = {}
     for m, element in enumerate(frame.assembly.elements):
-        ends = {element.mesh.pinion, element.mesh.gear}
-        planets = next((group for group in frame.sets if ends & set(group.names)), None)
+        planets = frame.planets_of(m)
         if planets is None:
             found[element.mesh.name] = ((m,), None)
             continue
@@ -435,6 +440,8 @@ def _turns_per_cycle(wave: MeshWave, planets: PlanetSet) -> int | None:
     Planets that are ahead by multiples of p / N of a cycle carry harmonic h into the wave h p; seen from the frame that
     wave turns back with the carrier.
     """
+    if planets.is_single:
+        return 0
     ahead = np.array(wave.ahead)
     count = planets.waves
     step = round(float(ahead[1]) * count)

@@ -1,15 +1,17 @@
-"""Planets in multi-blade (Coleman) coordinates: equal, equally spaced planets of a carrier, and waves around it."""
+"""Planets in multi-blade (Coleman) coordinates: equal, equally spaced planets of a carrier, and waves around it.
+
+Planets that are fewer than three, or unequal, or unequally spaced, have no such waves: each of them is a set of its own.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
 import numpy as np
 
-from exugear.gearbox.parts import Body
 from exugear.system.bearings.stiffness import FEWEST, equally_spaced, planet_families
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Floats
@@ -45,6 +47,11 @@ class PlanetSet:
         return len(self.names)
 
     @property
+    def is_single(self) -> bool:
+        """Whether the set is one planet of several that are not alike: stiffness then varies as the carrier turns."""
+        return self.waves == 1
+
+    @property
     def passing(self) -> int:
         """Turns of the carrier that lie between the orders that the passing planets couple at a flexible ring gear.
 
@@ -60,7 +67,7 @@ class PlanetSet:
     def kinds(self, count: int | None = None) -> tuple[tuple[WaveKind, int], ...]:
         """Kind and wave number of each wave, by default of as many as planets, which describe any motion of these.
 
-        A flexible ring gear has more, which follow.
+        A flexible ring gear has more, which follow, and so has a single planet: what a central body does there.
 
         Examples
         --------
@@ -119,16 +126,20 @@ def wave_kinds(planets: int, count: int) -> tuple[tuple[WaveKind, int], ...]:
 def planet_sets(assembly: Assembly) -> tuple[PlanetSet, ...]:
     """Planet sets of a gearbox, checked.
 
+    Planets of a carrier are sets of one where those of any of its families are fewer than three or unequally spaced.
+
     Raises
     ------
     SteadyError
-        Two planets, planets that are not equally spaced, or elastic ones.
+        Planets are flexible.
     """
     gearbox = assembly.gearbox
     bodies = {body.name: body for body in assembly.bodies}
     speeds = gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
     sets = []
-    for planets in planet_families(assembly.bodies):
+    families = planet_families(assembly.bodies)
+    unlike = {planets[0].carrier for planets in families if len(planets) < FEWEST or not equally_spaced(planets)}
+    for planets in families:
         carrier = str(planets[0].carrier)
         family = planets[0].family
         elastic = [planet.name for planet in planets if planet.name in assembly.elastic_bodies]
@@ -137,24 +148,16 @@ def planet_sets(assembly: Assembly) -> tuple[PlanetSet, ...]:
                 f"bodies.{family}: flexible planets, whose stiffness is not constant in the fixed frame; set "
                 "flexibility = 'none' for the steady-state response"
             )
-        _check_spacing(family, planets)
         names = tuple(planet.name for planet in planets)
         angles = np.array([planet.orbit_angle for planet in planets])
-        sets.append(PlanetSet(names, bodies[carrier].name, angles, speeds[carrier]))
+        whole = PlanetSet(names, bodies[carrier].name, angles, speeds[carrier])
+        if carrier in unlike:
+            sets += [
+                replace(whole, names=(name,), angles=angle) for name, angle in zip(names, angles[:, None], strict=True)
+            ]
+        else:
+            sets.append(whole)
     return tuple(sets)
-
-
-def _check_spacing(family: str, planets: Sequence[Body]) -> None:
-    if len(planets) < FEWEST:
-        raise SteadyError(
-            f"bodies.{family}: {len(planets)} planets; with fewer than {FEWEST} equally spaced planets the matrices "
-            "vary with the carrier angle, which the steady-state response cannot treat; use exugear run instead"
-        )
-    if not equally_spaced(planets):
-        raise SteadyError(
-            f"bodies.{family}.planet_angles_deg: with unequally spaced planets the matrices vary with the carrier "
-            "angle, which the steady-state response cannot treat; use exugear run instead"
-        )
 
 
 def phases_ahead(assembly: Assembly, meshes: Sequence[int]) -> tuple[float, ...]:

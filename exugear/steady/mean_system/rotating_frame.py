@@ -30,6 +30,8 @@ PLACES = 4
 """Places of the carrier between one planet's and the next, over which matrices are averaged, at least.
 
 A thousandth of a light resonance's amplitude hangs on it: 5e-6 of a frequency."""
+SINGLE_PLACES = 8
+"""The same over a revolution where planets are not alike: stiffness has harmonics up to the second."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +42,8 @@ class RotatingFrame:
     sets: tuple[PlanetSet, ...]
     carriers: tuple[SymmetricCarrier, ...] = ()
     """Flexible carriers, which the assembly has in this symmetric form."""
-    ring_meshes: bool = True
-    """Whether the meshes of a flexible ring gear have forces."""
+    with_varying: bool = True
+    """Whether meshes and bearings have forces whose stiffness varies as the carrier turns."""
 
     @cached_property
     def mean_meshes(self) -> MeshArrays:
@@ -56,9 +58,9 @@ class RotatingFrame:
             meshes = self.assembly.linear_meshes()
             # What tables resist misalignment with is in the forces that they have beyond this.
             meshes = meshes._replace(tilt=np.zeros_like(meshes.tilt))
-        if self.ring_meshes:
+        if self.with_varying:
             return meshes
-        kept = np.array([self.ring_waves(m) == 0 for m in range(len(meshes.damping))])
+        kept = np.array([not self.varies_at(m) for m in range(len(meshes.damping))])
         return meshes._replace(
             stiffness=meshes.stiffness * kept[:, None, None],
             damping=meshes.damping * kept,
@@ -85,9 +87,25 @@ class RotatingFrame:
         return tuple(found)
 
     @property
-    def has_elastic_ring(self) -> bool:
-        """Whether planets mesh with a flexible ring gear, so that stiffness varies as they pass."""
-        return bool(self.assembly.travelling.first.size)
+    def varies(self) -> bool:
+        """Whether stiffness varies as the carrier turns: planets pass a flexible ring gear, or are not alike."""
+        return bool(self.assembly.travelling.first.size) or any(planets.is_single for planets in self.sets)
+
+    def planets_of(self, mesh: int) -> PlanetSet | None:
+        """Planets of which one has a mesh, by its number; None of a mesh without planets."""
+        own = self.assembly.elements[mesh].mesh
+        return next((planets for planets in self.sets if {own.pinion, own.gear} & set(planets.names)), None)
+
+    def varies_at(self, mesh: int) -> bool:
+        """Whether the stiffness that a mesh gives the gearbox varies as the carrier turns."""
+        planets = self.planets_of(mesh)
+        return planets is not None and self.waves_around(mesh, planets) > 0
+
+    @cached_property
+    def varying_bearings(self) -> Integers:
+        """Numbers of the bearings of planets that are not alike."""
+        single = {name for planets in self.sets if planets.is_single for name in planets.names}
+        return np.flatnonzero([support.body in single for support in self.assembly.supports])
 
     def ring_waves(self, mesh: int) -> int:
         """Highest wave number around the carrier that the deflection of a mesh has by a flexible ring gear; 0 of none.
@@ -98,12 +116,14 @@ class RotatingFrame:
         body = self.assembly.elastic_bodies.get(gear.gear)
         return 0 if body is None else (len(body.sectors.get(gear.pair.gear.name, ())) - 1) // 2
 
-    def waves_of_ring(self, mesh: int, planets: PlanetSet) -> int:
-        """Count the waves of the deflections of planets with a flexible ring gear, of which a mesh is one; 0 of none.
+    def waves_around(self, mesh: int, planets: PlanetSet) -> int:
+        """Count the waves of the deflections of planets, of which a mesh is one, where they are more than the planets.
 
-        The cosine and sine of half of an even number of planets are no motion of these, whose wave alternates.
+        A flexible ring gear has them, and every mesh of a single planet: cosine and sine are what the other body does.
+        Otherwise 0. The cosine and sine of half of an even number of planets are no motion of these, whose wave
+        alternates.
         """
-        highest = self.ring_waves(mesh)
+        highest = max(self.ring_waves(mesh), int(planets.is_single))
         alternating = planets.waves % 2 == 0
         return max(planets.waves, 2 * highest + 1 + alternating) if highest else 0
 
@@ -112,23 +132,26 @@ class RotatingFrame:
         """Angles of the input (p,), rad, at which carriers are evenly spread from one planet's place to the next.
 
         Over them and all planets products of two waves around a flexible ring gear have their exact mean. With an even
-        number of planets they reach to the place after that: see `PlanetSet.passing`.
+        number of planets they reach to the place after that: see `PlanetSet.passing`. Those of single planets are
+        spread over a revolution.
         """
-        for m, element in enumerate(self.assembly.elements):
-            for planets in self.sets:
-                if element.mesh.pinion in planets.names and (highest := self.ring_waves(m)):
-                    count = max(PLACES * planets.waves // planets.passing, 2 * highest // planets.passing + 1)
-                    passage = 2.0 * math.pi / abs(planets.passing * planets.ratio)
-                    return np.asarray(passage * np.arange(count) / count)
+        for m in range(len(self.assembly.elements)):
+            planets = self.planets_of(m)
+            if planets is not None and self.varies_at(m):
+                least = SINGLE_PLACES if planets.is_single else PLACES * planets.waves // planets.passing
+                count = max(least, 2 * self.ring_waves(m) // planets.passing + 1)
+                passage = 2.0 * math.pi / abs(planets.passing * planets.ratio)
+                return np.asarray(passage * np.arange(count) / count)
         passage = max(2.0 * math.pi / abs(planets.waves * planets.ratio) for planets in self.sets)
         return np.asarray(passage * np.arange(PLACES) / PLACES)
 
     @cached_property
-    def without_elastic_ring(self) -> RotatingFrame:
-        """The same gearbox without the forces of the meshes of a flexible ring gear; itself if it has none."""
-        if not self.has_elastic_ring:
+    def without_varying(self) -> RotatingFrame:
+        """The same gearbox without what varies as the carrier turns; itself if nothing does."""
+        if not self.varies:
             return self
-        return replace(self, ring_meshes=False)
+        connectors = self.assembly.connectors.without_forces(self.varying_bearings)
+        return replace(self, assembly=replace(self.assembly, connectors=connectors), with_varying=False)
 
     def _unit(self) -> Jet:
         size = self.assembly.size

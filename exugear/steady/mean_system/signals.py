@@ -94,7 +94,7 @@ def mesh_signal_names(waves: MeshWaves) -> tuple[SignalName, ...]:
     """
     errors = tuple(SignalName(f"mesh_dte {wave.name}", "mesh_dte", "m") for wave in waves.waves)
     forces = tuple(SignalName(f"mesh_force {waves.waves[n].name}", "mesh_force", "N") for n in waves.force_waves)
-    standing = [(GEAR_FORCE, GEAR_MOMENT, gear) for gear in standing_gears(waves.assembly)]
+    standing = [(GEAR_FORCE, GEAR_MOMENT, gear) for gear in standing_gears(waves.system.frame)]
     reacting = reacting_excitations(waves.assembly.gearbox)
     standing += [(REACTION_FORCE, REACTION_MOMENT, excitation) for excitation in reacting]
     loads = tuple(
@@ -117,18 +117,17 @@ def signal_rows(system: MeanSystem, speed: float) -> SignalRows:
     rate = [np.zeros(assembly.size)]
     acceleration = [np.zeros(assembly.size)]
     if assembly.supports:
-        q, v, _ = frame.state(0.0, speed, system.static_at(speed))
         turn, labels = support_waves(assembly, frame.sets)
-        all_by_q = _slopes(lambda step: _loads(assembly, q + step, v), assembly.size, place_step(assembly))
-        all_by_v = _slopes(lambda step: _loads(assembly, q, v + step), assembly.size, RATE_STEP)
+        # Bearings of planets that are not alike count by their mean here; `varying_bearings` has the rest.
+        places = frame.places if frame.varying_bearings.size else np.zeros(1)
+        by_place, by_rate = np.mean([_load_rows(system, speed, float(psi)) for psi in places], axis=0)
         count = 3 * len(assembly.supports)
-        by_q, by_v = turn @ all_by_q[:count], turn @ all_by_v[:count]
         seats = turn @ _seat_rows(assembly)
         for quantity, units in (("support_force", "N"), ("seat_acceleration", "m/s2")):
             names += [SignalName(f"{quantity} {label}", quantity, units) for label in labels]
-        place += [*(by_q @ t + speed * by_v @ t1), *(speed**2 * seats @ t2)]
-        rate += [*(by_v @ t), *(2.0 * speed * seats @ t1)]
-        acceleration += [*np.zeros_like(by_q), *(seats @ t)]
+        place += [*by_place[:count], *(speed**2 * seats @ t2)]
+        rate += [*by_rate[:count], *(2.0 * speed * seats @ t1)]
+        acceleration += [*np.zeros_like(by_place[:count]), *(seats @ t)]
         standing = moment_supports(assembly)
         names += [
             SignalName(f"{SUPPORT_MOMENT} {assembly.supports[n].name} {axis}", SUPPORT_MOMENT, "N m")
@@ -136,10 +135,9 @@ def signal_rows(system: MeanSystem, speed: float) -> SignalRows:
             for axis in AXES
         ]
         of_standing = (count + 3 * standing[:, None] + np.arange(3)).ravel()
-        by_q, by_v = all_by_q[of_standing], all_by_v[of_standing]
-        place += [*(by_q @ t + speed * by_v @ t1)]
-        rate += [*(by_v @ t)]
-        acceleration += [*np.zeros_like(by_q)]
+        place += [*by_place[of_standing]]
+        rate += [*by_rate[of_standing]]
+        acceleration += [*np.zeros_like(by_place[of_standing])]
     twisting, winding = coupling_rows(assembly)
     names += [_part(COUPLING_TORQUE, name) for name in assembly.spring_names]
     place += [*(twisting @ t)]
@@ -155,6 +153,20 @@ def signal_rows(system: MeanSystem, speed: float) -> SignalRows:
 def _part(signal: SignalName, name: str) -> SignalName:
     """Name a signal of a part."""
     return SignalName(f"{signal.name} {name}", signal.quantity, signal.units)
+
+
+def _load_rows(system: MeanSystem, speed: float, psi: float) -> tuple[Floats, Floats]:
+    """Return `_loads`, forces in multi-blade components, by the frame's coordinates and rates, (6 supports, size)."""
+    frame = system.frame
+    assembly = frame.assembly
+    t, t1, _ = frame.matrices(psi)
+    q, v, _ = frame.state(psi, speed, system.static_at(speed))
+    by_q = _slopes(lambda step: _loads(assembly, q + step, v), assembly.size, place_step(assembly))
+    by_v = _slopes(lambda step: _loads(assembly, q, v + step), assembly.size, RATE_STEP)
+    turn = support_waves(assembly, frame.sets, psi)[0]
+    for values in (by_q, by_v):
+        values[: len(turn)] = turn @ values[: len(turn)]
+    return by_q @ t + speed * by_v @ t1, by_v @ t
 
 
 def _loads(assembly: Assembly, q: Floats, v: Floats) -> Floats:
@@ -241,7 +253,10 @@ def support_waves(assembly: Assembly, sets: tuple[PlanetSet, ...], psi: float = 
                     for n, support in enumerate(names):
                         row[3 * support : 3 * support + 3] = inverse[wave, n] * radial[n, axis]
                     turn[3 * at + axis] = row
-                    labels[3 * at + axis] = f"{family} {wave_name(wave, planets.waves)} {PLANET_AXES[axis]}"
+                    place = f"{family} {wave_name(wave, planets.waves)}"
+                    if planets.is_single:
+                        place = assembly.supports[at].name
+                    labels[3 * at + axis] = f"{place} {PLANET_AXES[axis]}"
     return turn, labels
 
 

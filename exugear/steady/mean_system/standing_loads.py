@@ -16,6 +16,7 @@ import numpy as np
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import node_position
 from exugear.steady.mean_system.mesh_waves import MeshWaves, mesh_groups
+from exugear.steady.mean_system.rotating_frame import RotatingFrame
 from exugear.system.kernels.coordinates import BODY_SIZE, TILT
 from exugear.system.kernels.meshes import TILT_LEVER
 from exugear.system.system import Assembly
@@ -36,13 +37,17 @@ def moment_supports(assembly: Assembly) -> Integers:
     return np.array([n for n, support in enumerate(assembly.supports) if support.name in standing], dtype=np.int64)
 
 
-def standing_gears(assembly: Assembly) -> tuple[str, ...]:
-    """Gears of fixed bodies, without those that are flexible sectors, on which the place of the load matters."""
+def standing_gears(frame: RotatingFrame) -> tuple[str, ...]:
+    """Gears of fixed bodies on which the load is the same wherever the carrier stands.
+
+    It is not on flexible sectors, and where planets are not alike.
+    """
+    assembly = frame.assembly
     found = {
         gear: None
-        for element in assembly.elements
+        for mesh, element in enumerate(assembly.elements)
         for body, gear in _ends(element)
-        if _stands(assembly, body) and not _has_sectors(assembly, body, gear)
+        if _stands(assembly, body) and not frame.varies_at(mesh)
     }
     return tuple(found)
 
@@ -81,7 +86,7 @@ def gear_load_rows(waves: MeshWaves) -> tuple[Floats, Floats, Floats]:
     arm of the load times that of the misalignment, as in `exugear.system.tooth_mesh.laws.mesh_forces`.
     """
     assembly = waves.assembly
-    gears = standing_gears(assembly)
+    gears = standing_gears(waves.system.frame)
     along, turning, *sliding = np.zeros((2 + FRICTION_PARTS, len(waves.waves), BODY_SIZE * len(gears)))
     groups = {meshes[0]: (meshes, planets) for meshes, planets in mesh_groups(waves.system.frame)}
     for number, wave in enumerate(waves.waves):
@@ -97,7 +102,7 @@ def gear_load_rows(waves: MeshWaves) -> tuple[Floats, Floats, Floats]:
             friction = zip(sliding, -element.friction_rows, strict=True)
             for part, rows in ((along, force), (turning, element.misalignment), *friction):
                 for (body, gear), row in zip(_ends(element), rows.reshape(2, BODY_SIZE), strict=True):
-                    if gear in gears and _stands(assembly, body) and not _has_sectors(assembly, body, gear):
+                    if gear in gears and _stands(assembly, body):
                         first = BODY_SIZE * gears.index(gear)
                         part[number, first : first + BODY_SIZE] -= share * _about_gear(assembly, body, gear, row)
     return along, turning, np.stack(sliding, axis=1)
@@ -111,11 +116,6 @@ def _ends(element: MeshElement) -> tuple[tuple[str, str], tuple[str, str]]:
 
 def _stands(assembly: Assembly, body: str) -> bool:
     return assembly.gearbox.body(body).fixed
-
-
-def _has_sectors(assembly: Assembly, body: str, gear: str) -> bool:
-    elastic = assembly.elastic_bodies.get(body)
-    return elastic is not None and bool(elastic.sectors.get(gear))
 
 
 def _about_gear(assembly: Assembly, name: str, gear: str, row: Floats) -> Floats:

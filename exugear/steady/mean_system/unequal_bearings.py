@@ -1,18 +1,20 @@
-"""Bearings of planets whose loads are unequal: what each is stiffer or softer than the mean of its set.
+"""Bearings of planets that are not alike: what they have beyond the averaged system as the carrier turns.
 
 The averaged system has equal planets. Where displaced pins share the load unequally, the tangent of a catalogue bearing
-at its load differs from planet to planet. In the frame of the carrier the difference stands still,
+at its load differs from planet to planet; planets that are fewer than three or unequally spaced have no mean that is
+the same at all angles. In the frame of the carrier the difference stands still,
 
     T'(psi) f(T(psi) u, T(psi) u') = sum_l e^(i l psi) (b_l + A_l u + B_l u'),
 
 so that the static state has forces b_l at multiples of the carrier's rotation, and each line of the response acts on
-those beside it. The differences are small: their forces follow from the solution before.
+those beside it. Differences by displaced pins are small: their forces follow from the solution before. Those of planets
+that are not alike are solved with the meshes (`exugear.steady.balance.passing_planets`).
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,13 +29,17 @@ from fe_ste.tools.arrays import Complexes, Floats, Integers
 
 LEAST = 1e-9
 """Share of the largest coefficient of a series below which one is zero but for round-off."""
+ROUND_OFF = 1e-6
+"""Share of the stiffness along a coordinate below which its variation is one of second order, or round-off."""
+VARYING_SAMPLES = 9
+"""Places of the carrier for planets that are not alike: their stiffness has harmonics up to the second."""
 AXES = 3
 """Components of a force."""
 
 
 @dataclass(frozen=True, eq=False)
 class UnequalBearings:
-    """Forces of bearings of the planets of one carrier beyond the mean of their set.
+    """Forces of bearings of the planets of one carrier beyond those in the averaged system.
 
     Series over t multiples of the carrier's angle, of c coordinates of the rotating frame and r signals. Values hold
     where the input turns about +z; where it turns about -z, they are the conjugates.
@@ -58,6 +64,26 @@ class UnequalBearings:
     signals_stiffness: Complexes
     signals_damping: Complexes
     """(t, r, c) derivatives of these."""
+
+    def functions_at(self, speed: float) -> tuple[Complexes, Complexes]:
+        """Stiffness and damping (2 t + 1, c, c) at multiples -t .. t of the base of the carrier, at an input speed.
+
+        They give forces that the bodies feel in the opposite sense, as those of meshes.
+        """
+        most = int(np.abs(self.turns).max())
+        found = np.zeros((2, 2 * most + 1, *self.stiffness.shape[1:]), dtype=complex)
+        found[:, self.sense * self.turns + most] = -self.stiffness, -self.damping
+        return (found[0], found[1]) if speed > 0.0 else (found[0].conj(), found[1].conj())
+
+    def still_at(self, lines: LineSet, carrier: int, speed: float) -> Complexes:
+        """Forces (n, c) of the static state at lines, in the same sense; `carrier` is its place among the bases."""
+        shift = np.zeros((len(self.turns), lines.index.shape[1]), dtype=np.int64)
+        shift[:, carrier] = self.sense * self.turns
+        places, mirrored = lines.find(shift)
+        there = (places >= 0) & ~mirrored
+        found = np.zeros((len(lines.index), len(self.coordinates)), dtype=complex)
+        np.add.at(found, places[there], -self.still[there])
+        return found if speed > 0.0 else found.conj()
 
     def at(self, lines: LineSet, carrier: int, speed: float, motion: Complexes) -> tuple[Complexes, Complexes]:
         """Find generalized forces (n, size) of a motion, and signals (n, r) with those of the static state, at lines.
@@ -91,6 +117,33 @@ class UnequalBearings:
         return forces, signals
 
 
+def varying_bearings(system: MeanSystem) -> UnequalBearings | None:
+    """Find what the bearings of planets that are not alike have beyond their mean over the carrier's angle, if any."""
+    frame = system.frame
+    numbers = frame.varying_bearings
+    if not numbers.size:
+        return None
+    given = frame.assembly.connectors.chosen(numbers)
+    none = given.without_forces(np.arange(len(numbers)))
+    planets = next(planets for planets in frame.sets if planets.is_single)
+    found = _series(system, (given, none), planets, numbers, VARYING_SAMPLES)
+    turning = found.turns != 0
+    # Directions that do not vary, such as along the axis, are none of its coordinates.
+    sizes = np.abs(found.stiffness[turning])
+    of_coordinates = sizes.max(axis=(0, 1)) > ROUND_OFF * np.abs(found.stiffness).max(axis=(0, 1))
+    return replace(
+        found,
+        turns=found.turns[turning],
+        coordinates=found.coordinates[of_coordinates],
+        still=found.still[turning][:, of_coordinates],
+        stiffness=found.stiffness[turning][:, of_coordinates][:, :, of_coordinates],
+        damping=found.damping[turning][:, of_coordinates][:, :, of_coordinates],
+        signals_still=found.signals_still[turning],
+        signals_stiffness=found.signals_stiffness[turning][..., of_coordinates],
+        signals_damping=found.signals_damping[turning][..., of_coordinates],
+    )
+
+
 def unequal_bearings(assembly: Assembly, system: MeanSystem, planets: PlanetSet) -> UnequalBearings | None:
     """Find what the bearings of a set of planets have beyond their mean; None where they are equal.
 
@@ -107,9 +160,19 @@ def unequal_bearings(assembly: Assembly, system: MeanSystem, planets: PlanetSet)
     if all(np.array_equal(own, getattr(equal, name)) for name, own in laws.items()):
         return None
     both = equal._replace(**laws), equal
-    ends = equal.bodies[equal.bodies >= 0]
-    coordinates = np.unique(ends[:, None] + np.arange(BODY_SIZE))
-    samples = 4 * (planets.waves // 2 + 1) + 1
+    return _series(system, both, planets, numbers, 4 * (planets.waves // 2 + 1) + 1)
+
+
+def _series(
+    system: MeanSystem,
+    both: tuple[ConnectorArrays, ConnectorArrays],
+    planets: PlanetSet,
+    numbers: Integers,
+    samples: int,
+) -> UnequalBearings:
+    """Series of what the first bearings have beyond the second, from a number of places of the carrier."""
+    bodies = both[0].bodies
+    coordinates = np.unique(bodies[bodies >= 0][:, None] + np.arange(BODY_SIZE))
     angles = 2.0 * np.pi * np.arange(samples) / samples
     parts = [_beyond_mean(system, both, angle / planets.ratio, coordinates, numbers) for angle in angles.tolist()]
     count = len(coordinates)

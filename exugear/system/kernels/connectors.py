@@ -71,6 +71,16 @@ class ConnectorArrays(NamedTuple):
             rolling=selected_rolling(self.rolling, numbers),
         )
 
+    def without_forces(self, numbers: Integers) -> ConnectorArrays:
+        """Return the same, with no force of the matrices of some of them."""
+        kept = np.ones(len(self.bodies))
+        kept[numbers] = 0.0
+        return self._replace(
+            stiffness=self.stiffness * kept[:, None, None],
+            damping=self.damping * kept[:, None, None],
+            point_load=self.point_load * kept[:, None],
+        )
+
 
 class _Ends(NamedTuple):
     """Both ends of connectors: axes of the bodies (..., c, 2, 3, 3), then vectors (..., c, 2, 3), global axes.
