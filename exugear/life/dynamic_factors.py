@@ -238,11 +238,11 @@ def factors_of_response(assembly: Assembly, rating: RatingSection, path: Path, b
     speed = ratio * np.abs(data["speed"].to_numpy())
     found: dict[str, list[tuple[Floats, Floats]]] = {}
     for mesh in gearbox.meshes:
-        if mesh.family not in found:
-            ends = {mesh.pinion, mesh.gear}
-            planets = next((one for one in sets if ends & set(one.names)), None)
+        ends = {mesh.pinion, mesh.gear}
+        planets = next((one for one in sets if ends & set(one.names) and not one.is_single), None)
+        if planets is None or mesh.family not in found:
             values = family_factors(data, mesh.family, mesh.name, planets, frequencies[mesh.name])
-            found[mesh.family] = [(speed, values)]
+            found.setdefault(mesh.family, []).append((speed, values))
     source = (
         f"the steady-state response ({level}) at {len(speed)} speeds of {body} from {speed.min() / RPM:.4g} to "
         f"{speed.max() / RPM:.4g} rpm"

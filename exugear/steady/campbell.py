@@ -248,7 +248,7 @@ class ModeNamer:
         return mode_name(self.assembly, tuple(self._elements), kinetic, strain / max(float(strain.sum()), 1e-300))
 
     def _kind(self, shape: Complexes, kinetic: Floats) -> str:
-        sets = self.system.frame.sets
+        sets = [planets for planets in self.system.frame.sets if not planets.is_single]
         shares = [(planets, self._motion_shares(planets, shape, kinetic)) for planets in sets]
         if not shares:
             return ""
@@ -366,10 +366,11 @@ def modes_over_speed(system: MeanSystem, low: float, high: float, highest: float
 def frequencies_over_angle(system: MeanSystem, tracks: ModeTracks) -> Floats:
     """Lowest and highest frequency of modes (m, 2) over the angle of the carrier, over that at zero angle.
 
-    The stiffness of a flexible ring gear differs from place to place: frequencies vary as the planets pass. They are
-    those with the carrier held at angles spread over a planet passage, at the middle one of the speeds. Modes that
-    depend on one angle do not cross (von Neumann and Wigner 1929): the n-th frequency at each angle is that of one
-    mode, whose shape turns with the planets. Both are 1 without a flexible ring gear.
+    The stiffness of a flexible ring gear differs from place to place, and that of planets which are not alike with
+    their places: frequencies vary as the planets pass. They are those with the carrier held at angles spread over a
+    planet passage, at the middle one of the speeds. Modes that depend on one angle do not cross (von Neumann and Wigner
+    1929): the n-th frequency at each angle is that of one mode, whose shape turns with the planets. Both are 1 where
+    stiffness does not vary.
     """
     found = np.ones((tracks.frequency.shape[1], 2))
     if system.over_angle is None:

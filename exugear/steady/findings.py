@@ -106,7 +106,7 @@ def is_excited(data: xr.Dataset) -> bool:
 def _in_time(data: xr.Dataset, options: str = "") -> str:
     """Return what evaluates nonlinear models: the method `nonlinear`, or a run.
 
-    The method has neither displaced planet pins nor a flexible ring gear.
+    The method has neither displaced planet pins nor stiffness that varies with the carrier.
     """
     if data.attrs.get("varying_carrier") or _load_sharing(data):
         return f"exugear run{options}"
@@ -114,7 +114,7 @@ def _in_time(data: xr.Dataset, options: str = "") -> str:
 
 
 def _load_sharing(data: xr.Dataset) -> dict[str, float]:
-    """K_gamma of families whose planets are on displaced pins."""
+    """K_gamma of families whose planets are loaded unequally."""
     found: dict[str, float] = json.loads(str(data.attrs.get("load_sharing", "{}")))
     return found
 
@@ -179,7 +179,7 @@ def _models(data: xr.Dataset) -> Iterator[Finding]:
         yield Finding("warning", text)
     if sharing := _load_sharing(data):
         values = ", ".join(f"{value:.3f} of {family}" for family, value in sharing.items())
-        text = f"displaced planet pins: K_gamma = {values} (largest over mean force of the planets' meshes)"
+        text = f"unequally loaded planets: K_gamma = {values} (largest over mean force of the planets' meshes)"
         yield Finding("note", text, max(sharing.values()))
     apart = float(np.max(np.nan_to_num(data["contact_loss_fraction"].to_numpy()), initial=0.0))
     if apart > 0.0:
@@ -206,24 +206,27 @@ def _models(data: xr.Dataset) -> Iterator[Finding]:
 
 
 def _passing(data: xr.Dataset) -> Iterator[Finding]:
-    """Orders of planets that pass a flexible ring gear."""
+    """Orders beside others by stiffness that varies with the angle of a carrier."""
     carrier = str(data.attrs.get("varying_carrier", ""))
     if not carrier:
         return
     left_out = float(data.attrs["neighbours_left_out"])
     passing = data["index"].to_numpy()[:, list(data["base"].to_numpy()).index(carrier)]
     count = int(np.count_nonzero(passing))
-    text = f"flexible ring gear: {count} orders of passing planets and beside mesh orders are included; those left out "
-    text += f"change the transmission error and the deflections of the meshes by at most {100.0 * left_out:.1g} %"
+    text = (
+        f"stiffness varies with the angle of {carrier}: {count} orders of passing planets and beside mesh orders are "
+    )
+    text += "included; those left out change the transmission error and the deflections of the meshes by at most "
+    text += f"{100.0 * left_out:.1g} %"
     yield Finding("warning" if left_out > NOTICED_NEIGHBOURS else "note", text, left_out)
     over_angle = data["mode_over_angle"].to_numpy()
     if over_angle.size:
         spread = over_angle[:, 1] - over_angle[:, 0]
         most = int(np.argmax(spread))
         frequency = float(np.nanmean(data["mode_frequency"].to_numpy()[:, most]))
-        low, high = 100.0 * (over_angle[most] - 1.0)
-        text = "natural frequencies are those with the carrier at zero angle; as the planets pass the ring gear, they "
-        text += f"vary from {low:.2g} to {high:+.2g} % at most (mode at {frequency:.0f} Hz)"
+        low, high = (100.0 * np.round(over_angle[most] - 1.0, 6)).tolist()
+        text = f"natural frequencies are those with {carrier} at zero angle; as it turns, they vary from {low:.2g} to "
+        text += f"{high:+.2g} % at most (mode at {frequency:.0f} Hz)"
         yield Finding("note", text, float(spread[most]))
 
 

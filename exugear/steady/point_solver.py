@@ -41,6 +41,7 @@ from exugear.steady.balance.response import (
 )
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
 from exugear.steady.harmonics.lines import LineSet, TorusSampling, joined, largest
+from exugear.steady.mean_system.carrier_stability import growth_over_carrier
 from exugear.steady.mean_system.mean_system import Steps, mean_system
 from exugear.steady.mean_system.mesh_places import DEFLECTION, POSITION
 from exugear.steady.mean_system.mesh_waves import FEWEST, mesh_waves
@@ -190,7 +191,10 @@ class PointSolver:
 
     def growth(self, low: float, high: float) -> float:
         """Fastest growth of a disturbance between two speeds of the input (rad/s), 1/s."""
-        model = self.linear.without_shaft_orders.frozen
+        model = self.linear.without_shaft_orders
+        if model.varying:
+            system = model.system
+            return max(growth_over_carrier(system, float(speed)) for speed in system.speeds if speed != 0.0)
         found = [mean_growth(model)]
         unknown = model.loses_contact or model.waves.carriers or not model.waves.waves
         for candidate in () if unknown else candidates(model, low, high)[:CHECKED]:

@@ -47,8 +47,8 @@ from exugear.steady.settings import (
     SteadySettings,
     check_law,
     check_nonlinear,
-    check_varying,
     check_speeds,
+    check_varying,
 )
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers, SingleComplexes, Texts
@@ -299,7 +299,7 @@ SLOWEST_BRANCH = 0.01
 LONGEST_WARNING = 300
 """Letters of a remark."""
 AT_ONCE = 2
-"""Speeds that are solved at the same time with a flexible ring gear: nearly all of their time is compiled code."""
+"""Speeds solved at the same time where stiffness varies with the carrier: nearly all of it is compiled code."""
 RESOLVED = 1e-4
 """Share of the exchanged power below which dissipated power is round-off."""
 Kept = Callable[[SolvedPoints], None]

@@ -1,4 +1,4 @@
-"""How unequally planets on displaced pins share the load in a steady state: forces of their meshes on average."""
+"""How unequally planets that are not alike share the load in a steady state: forces of their meshes on average."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def mean_planet_forces(
     sense = math.copysign(1.0, speed)
     slow = np.flatnonzero(~model.lines.index[:, : len(waves.base_orders)].any(axis=1))
     turned = sense * 2.0 * np.pi * np.arange(ANGLES) / ANGLES
-    found = {}
+    found: dict[str, Floats] = {}
     for family in model.families:
         planets = family.planets
         if planets is None or family.carrier < 0:
@@ -44,12 +44,16 @@ def mean_planet_forces(
         phases = np.exp(1j * sense * np.outer(turned, turns[alone]))
         forces = np.real(phases @ lines[slow[alone]][:, columns])
         shapes = planets.values(math.copysign(1.0, planets.ratio) * turned)
-        found[own[0].family] = np.asarray(np.einsum("snw,sw->n", shapes, forces) / ANGLES)
+        loads = np.einsum("snw,sw->n", shapes, forces) / ANGLES
+        # Planets that are not alike are families of one each here.
+        found[own[0].family] = np.append(found.get(own[0].family, np.zeros(0)), loads)
     return found
 
 
 def load_sharing(model: HarmonicBalanceModel, amplitude: SingleComplexes, speeds: Floats) -> dict[str, float]:
-    """Find K_gamma of each family whose planets are on displaced pins: the largest mean force over the mean of all.
+    """Find K_gamma of each family whose planets are loaded unequally: the largest mean force over the mean of all.
+
+    They are on displaced pins, or fewer than three, or unequally spaced.
 
     Parameters
     ----------
@@ -57,7 +61,9 @@ def load_sharing(model: HarmonicBalanceModel, amplitude: SingleComplexes, speeds
     speeds : (points,) of the input, rad/s; the largest value over them counts
     """
     found: dict[str, float] = {}
-    if not displaced_carriers(model.waves.assembly, model.system.frame.sets):
+    sets = model.system.frame.sets
+    unequal = any(planets.is_single for planets in sets) or displaced_carriers(model.waves.assembly, sets)
+    if not unequal:
         return found
     for lines, speed in zip(amplitude, speeds.tolist(), strict=True):
         for family, forces in mean_planet_forces(model, lines, speed).items():

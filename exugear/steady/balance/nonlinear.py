@@ -24,7 +24,7 @@ from exugear.steady.harmonics.branches import exponents, kicks_needed
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError, solve_lines
 from exugear.steady.harmonics.lines import TorusSampling
 from exugear.steady.mean_system.bearing_waves import COMPONENTS
-from exugear.steady.mean_system.mean_system import mean_modes
+from exugear.steady.mean_system.mean_system import mean_modes, most_rolling
 from exugear.steady.mean_system.mesh_places import BACK, DEFLECTION, FRONT, MISALIGNMENT, POSITION, MeshPlaces
 from exugear.steady.mean_system.sampled_laws import (
     LawSamples,
@@ -551,8 +551,6 @@ def _mean_of_waves(there: Floats, back: Floats, slopes: Floats) -> Floats:
 
 SMOOTH_KICKS, PARTING_KICKS = 400, 1000
 """Minimum number of kicks per period, without and with contact loss, whose instants have to be resolved."""
-ROLLING = 2
-"""Multipliers of free rolling, which are one: angle and speed."""
 CHECKED = 3
 """Candidates whose Floquet exponents are computed."""
 
@@ -653,13 +651,7 @@ def growth_at(balance: HarmonicResidual, readings: Complexes, base: int, least: 
     reads = reads[read]
     found, shapes = exponents(constant, pushes, reads, varying, period)
     # Free rolling neither grows nor decays but for what the losses change with the speed: it is known by its shape.
-    assembly = model.waves.assembly
-    turning = assembly.rolling_velocity(np.zeros(assembly.size), system.frame.speeds)
-    along = system.mass @ np.linalg.solve(system.frame.matrices(0.0)[0], turning)
-    moved = shapes[:size]
-    energy = np.sqrt(np.abs(np.sum(moved.conj() * (system.mass @ moved), axis=0)))
-    rolling = np.argsort(-np.abs(along @ moved) / np.maximum(energy, 1e-300))[:ROLLING]
-    return float(np.delete(found, rolling).real.max())
+    return float(np.delete(found, most_rolling(system, shapes)).real.max())
 
 
 def growth_of_state(balance: HarmonicResidual, readings: Complexes, parted: bool) -> float:

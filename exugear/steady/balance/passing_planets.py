@@ -26,6 +26,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import scipy.linalg
 
 from exugear.steady.balance.excitation import HarmonicBalanceModel, turns_of_carrier
 from exugear.steady.balance.interface import Interface
@@ -41,8 +42,8 @@ class SolvedGroups(NamedTuple):
     """(g, n)"""
     mirrored: Booleans
     """(g, n) whether a line is taken in as its conjugate."""
-    inverse: Complexes
-    """(g, n s, n s) of the equation of the readings that vary."""
+    factors: list[tuple[Complexes, Integers]]
+    """g of the equation (n s, n s) of the readings that vary, as `scipy.linalg.lu_factor` gives them."""
     forces: Complexes
     """(g, n s, n s) forces along these readings."""
     answers: Complexes
@@ -154,25 +155,32 @@ class PassingPlanets:
         places, mirrored = lines
         groups, members = places.shape
         count = stiffness.shape[-1]
-        coupled_ones = np.abs(apart) <= self._turns
-        turns = np.where(coupled_ones, apart, 0) + self._turns
+        group, to, of = np.nonzero(np.abs(apart) <= self._turns)
+        turns = apart[group, to, of] + self._turns
         rates = 1j * frequencies[..., None, None] * np.eye(count) + self._carried
-        blocks = stiffness[turns] + self._of_damper[turns] @ rates[:, None]
-        blocks *= coupled_ones[..., None, None]
+        blocks = stiffness[turns] + self._of_damper[turns] @ rates[group, of]
         found = answers[places][..., self._at]
         answering = np.where(mirrored[..., None, None], found.conj(), found)
-        matrix = (answering[:, :, None, self._at] @ blocks).swapaxes(2, 3).reshape(groups, members * count, -1)
-        inverse = np.linalg.inv(matrix + np.eye(members * count))
-        forces = blocks.swapaxes(2, 3).reshape(groups, members * count, -1)
-        return SolvedGroups(places, mirrored, inverse, forces, answering)
+        forces, matrix = np.zeros((2, groups, members, count, members, count), dtype=complex)
+        forces[group, to, :, of] = blocks
+        # Products of arrays that are not in C order are slow.
+        own = np.ascontiguousarray(answering[:, :, self._at])
+        matrix[group, to, :, of] = own[group, to] @ blocks
+        matrices = matrix.reshape(groups, members * count, -1) + np.eye(members * count)
+        factors = [scipy.linalg.lu_factor(own, overwrite_a=True, check_finite=False) for own in matrices]
+        return SolvedGroups(places, mirrored, factors, forces.reshape(matrices.shape), answering)
 
     def solve(self, right: Complexes) -> Complexes:
         """Solve the equation (n, k) in which the mesh cycle does not vary."""
         out = right.copy()
         for group in self._solved_groups:
             given = np.where(group.mirrored[..., None], right[group.lines].conj(), right[group.lines])
-            own = group.inverse @ given[..., self._at].reshape(len(given), -1, 1)
-            forces = (group.forces @ own).reshape(*given.shape[:2], -1, 1)
+            varying = given[..., self._at].reshape(len(given), -1)
+            own = [
+                scipy.linalg.lu_solve(factor, b, check_finite=False)
+                for factor, b in zip(group.factors, varying, strict=True)
+            ]
+            forces = (group.forces @ np.array(own)[..., None]).reshape(*given.shape[:2], -1, 1)
             solved = given - (group.answers @ forces)[..., 0]
             out[group.lines[group.mirrored]] = solved[group.mirrored].conj()
             out[group.lines[~group.mirrored]] = solved[~group.mirrored]
@@ -184,7 +192,8 @@ def _varying_parts(
 ) -> list[tuple[slice, Complexes, Complexes]]:
     """Find the readings of each family of meshes and of the bearings that vary, and what couples these.
 
-    Stiffness and damping (2 turns + 1, s, s) at multiples of the carrier's angle; readings of the stiffness are lengths.
+    Stiffness and damping (2 turns + 1, s, s) are at multiples of the carrier's angle. What stiffness multiplies are
+    lengths.
     """
     forces = interface.ports.forces.shape[1]
     dampers = {(DEFLECTION, DEFLECTION): model.waves.damping[:, None].astype(np.complex128)}

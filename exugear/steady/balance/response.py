@@ -44,7 +44,7 @@ from fe_ste.tools.octets import SIZE
 TOLERANCE = 1e-9
 """Residual of the balance over the static deflections."""
 PASSING_TOLERANCE = 1e-6
-"""The same where planets pass a flexible ring gear: neighbours that are left out are larger by far."""
+"""The same where stiffness varies with the carrier: neighbours that are left out are larger by far."""
 POSITIONS_REPEATED = 2
 """Solutions after the first one, with positions in the mesh cycle that move with the orders of shafts."""
 BEARINGS_REPEATED = 2
@@ -309,7 +309,7 @@ def _varying_coordinates(model: HarmonicBalanceModel) -> Integers:
 
 
 def _still(interface: Interface, shape: tuple[int, ...], coordinates: Integers, lengths: Floats) -> Complexes:
-    """Readings (n, m f + c) of meshes (n, m, f) and bearings' coordinates without forces beyond the averaged system."""
+    """Find readings (n, m f + c) of meshes (n, m, f) and bearings without forces beyond the averaged system."""
     found = interface.static[..., : shape[2]].reshape(shape[0], -1)
     if coordinates.size:
         loads = interface.loads
@@ -319,7 +319,7 @@ def _still(interface: Interface, shape: tuple[int, ...], coordinates: Integers, 
 
 
 def _static_bearing_forces(model: HarmonicBalanceModel, speed: float) -> Complexes:
-    """Forces (n, c) in the static state of the bearings that vary with the carrier."""
+    """Find forces (n, c) in the static state of the bearings that vary with the carrier."""
     bearings = model.varying_bearings
     if bearings is None:
         return np.zeros((len(model.lines.index), 0), dtype=complex)

@@ -28,7 +28,7 @@ from exugear.system.bearings.stiffness import load_stands_still, planet_supports
 from exugear.system.modes import state_matrix
 from exugear.system.statics import RIGID_BODY_LIMIT, BalanceError, Linearised, linearise, static_state
 from exugear.system.system import Assembly
-from fe_ste.tools.arrays import Complexes, Floats
+from fe_ste.tools.arrays import Complexes, Floats, Integers
 from fe_ste.tools.display import ReprMixin
 
 Values = TypeVar("Values", Floats, Complexes)
@@ -54,6 +54,10 @@ ROWS_VARIATION = 2e-2
 
 Shares rotate with the carrier's angle. In the GRC, whose sun is displaced radially, the variation is 8e-3, at three
 times the carrier's frequency: orders change by less than 1e-3, and their sidebands are neglected."""
+
+
+ROLLING = 2
+"""Motions of free rolling: angle and speed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,11 +298,6 @@ def rotating_frame(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> RotatingF
         body = assembly.elastic_bodies.get(planets.carrier)
         if body is None:
             continue
-        if planets.is_single:
-            raise SteadyError(
-                f"bodies.{planets.carrier}: flexible, with planets that are fewer than three or unequally spaced, "
-                "which the steady-state response cannot treat; set flexibility = 'none', or use exugear run"
-            )
         known = carriers.get(planets.carrier)
         if known is None:
             axis = next(body.axis for body in assembly.bodies if body.name == planets.carrier)
@@ -331,9 +330,9 @@ def _check_varying(frame: RotatingFrame) -> None:
     for n in frame.varying_bearings:
         if rows[n]:
             raise SteadyError(
-                f"bearings.{frame.assembly.supports[n].family}.model = 'iso16281': on planets that are fewer than three "
-                "or unequally spaced, which the steady-state response cannot treat; set model = 'linear', or use "
-                "exugear run"
+                f"bearings.{frame.assembly.supports[n].family}.model = 'iso16281': on planets that are fewer than "
+                "three or unequally spaced, which the steady-state response cannot treat; set model = 'linear', or "
+                "use exugear run"
             )
 
 
@@ -346,7 +345,7 @@ def unsuitable(assembly: Assembly, elastic: Collection[str] = ()) -> str:
     """
     try:
         _check(assembly)
-        planet_sets(assembly)
+        _check_varying(RotatingFrame(assembly, planet_sets(assembly)))
         _check_ring(assembly, elastic)
     except SteadyError as error:
         return str(error)
@@ -592,6 +591,16 @@ def _checked_change(here: Floats, there: Floats, most: float) -> float:
             "that rotates with them), which the steady-state response cannot treat; use exugear run instead"
         )
     return change
+
+
+def most_rolling(system: MeanSystem, shapes: Complexes) -> Integers:
+    """Return the places of the shapes (2 size, n), by columns, that have the largest share of rolling in their energy."""
+    frame = system.frame
+    turning = frame.assembly.rolling_velocity(np.zeros(system.size), frame.speeds)
+    along = system.mass @ np.linalg.solve(frame.matrices(0.0)[0], turning)
+    moved = shapes[: system.size]
+    energy = np.sqrt(np.abs(np.sum(moved.conj() * (system.mass @ moved), axis=0)))
+    return np.asarray(np.argsort(-np.abs(along @ moved) / np.maximum(energy, 1e-300))[:ROLLING])
 
 
 # Modes of the mean system at one speed: eigenvalues with right and left shapes, gyroscopic and damped as it is

@@ -1,6 +1,6 @@
 """Planets in multi-blade (Coleman) coordinates: equal, equally spaced planets of a carrier, and waves around it.
 
-Planets that are fewer than three, or unequal, or unequally spaced, have no such waves: each of them is a set of its own.
+Planets that are fewer than three or unequally spaced have no such waves: each of them is a set of its own.
 """
 
 from __future__ import annotations
@@ -131,7 +131,7 @@ def planet_sets(assembly: Assembly) -> tuple[PlanetSet, ...]:
     Raises
     ------
     SteadyError
-        Planets are flexible.
+        Planets are flexible, or so is the carrier of planets that are not alike.
     """
     gearbox = assembly.gearbox
     bodies = {body.name: body for body in assembly.bodies}
@@ -139,6 +139,12 @@ def planet_sets(assembly: Assembly) -> tuple[PlanetSet, ...]:
     sets = []
     families = planet_families(assembly.bodies)
     unlike = {planets[0].carrier for planets in families if len(planets) < FEWEST or not equally_spaced(planets)}
+    for carrier in sorted(str(name) for name in unlike):
+        if carrier in assembly.elastic_bodies:
+            raise SteadyError(
+                f"bodies.{carrier}: a flexible carrier of planets that are fewer than three or unequally spaced, which "
+                "the steady-state response cannot treat; set flexibility = 'none', or use exugear run"
+            )
     for planets in families:
         carrier = str(planets[0].carrier)
         family = planets[0].family

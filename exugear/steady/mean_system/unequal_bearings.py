@@ -76,7 +76,7 @@ class UnequalBearings:
         return (found[0], found[1]) if speed > 0.0 else (found[0].conj(), found[1].conj())
 
     def still_at(self, lines: LineSet, carrier: int, speed: float) -> Complexes:
-        """Forces (n, c) of the static state at lines, in the same sense; `carrier` is its place among the bases."""
+        """Find forces (n, c) of the static state at lines, in that sense; `carrier` is its place among the bases."""
         shift = np.zeros((len(self.turns), lines.index.shape[1]), dtype=np.int64)
         shift[:, carrier] = self.sense * self.turns
         places, mirrored = lines.find(shift)
