@@ -1,4 +1,4 @@
-"""Bodies and their supports, built from the gearbox file: joints, bearings, mounts, couplings, load cases."""
+"""Parts built from the gearbox file: bodies, joints, bearings, mounts, couplings; load cases, forces, excitations."""
 
 from __future__ import annotations
 

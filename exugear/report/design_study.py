@@ -1,7 +1,8 @@
 """Design changes of a project: tables, static state and steady-state response of each changed gearbox.
 
-`exugear.report.findings.design_changes` has the proposals and what is compared. Each changed gearbox has a subfolder of
-the results, so that a stopped study resumes, and a repeated one reads its results.
+`exugear.report.findings.proposals` proposes the changes, and `exugear.report.findings.design_changes` compares the
+results. Each changed gearbox has a subfolder of the results, so that a stopped study resumes, and a repeated one reads
+its results.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""Files of results: the results folder, and complete and incomplete runs."""
+"""Results folder and files of runs, and what is computed from them: spectra, sound power, order tracking."""

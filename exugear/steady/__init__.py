@@ -3,7 +3,7 @@
 **Averaged system** (`mean_system.rotating_frame`, `mean_system.mean_system`): in multi-blade coordinates u, the gearbox
 has constant matrices, M u'' + C(W) u' + K(W) u = forces, at the speed W of the input.
 
-**Unknowns** (`mean_system.mesh_places`, `balance.excitation.Interface`): for every order k with the angular frequency
+**Unknowns** (`mean_system.mesh_places`, `balance.interface.Interface`): for every order k with the angular frequency
 w_k, the inputs y_k of the mesh models: deflection, and where the model needs them centre distance, misalignment and
 position in the mesh cycle. The orders are the integer combinations of the mesh frequencies (`harmonics.lines`).
 
@@ -21,6 +21,7 @@ With the compliance G(w_k) of the averaged system at the interface (`balance.exc
 A flexible ring gear couples orders beside each other (`balance.passing_planets`), of which those that matter are kept
 (`balance.neighbours`).
 
-**Solution** (`point_solver.PointSolver`): directly, by GMRES, or by Newton's method, at one speed. `steady_response`
-chooses the speeds, `damping_band` solves the highest peaks for other damping, and `steady_file` keeps the result.
+**Solution** (`point_solver.PointSolver.response`): directly, by GMRES, or by Newton's method, at one speed.
+`steady_response` chooses the speeds, `damping_band` solves the highest peaks for other damping, and `steady_file` keeps
+the result.
 """

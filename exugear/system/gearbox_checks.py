@@ -1,7 +1,9 @@
 """Quick construction of all parts of a gearbox: errors of later steps are reported before these start.
 
-Small motions of rigid bodies about the reference state. Every support constrains the directions in which its stiffness
-acts, every mesh its line of action, every coupling a difference of spins; how stiff they are does not matter here.
+`check_parts` builds the parts of tables, modes and runs without finite elements. `lacking` says why a variant cannot
+be computed; one reason is a body that can move without resistance, which `free_motion` finds from small motions of
+rigid bodies about the reference state. There every support constrains the directions in which its stiffness acts, every
+mesh its line of action, every coupling a difference of spins; how stiff they are does not matter.
 """
 
 from __future__ import annotations

@@ -1,9 +1,13 @@
 """Catalogue bearings at their operating loads: the static state with the nonlinear model of their rows.
 
 A bearing's stiffness depends on its load, and the load on the stiffness of all bearings. The static state is solved
-with the nonlinear model of every row, so that load and stiffness are consistent to round-off. The problem is convex,
-and starts from the bearings' stiffness at a nominal load. A linear bearing then passes through the state of its rows,
-with their tangent there: its static state is the same as with the rows.
+with the nonlinear model of every row, so that load and stiffness are consistent to round-off. The problem is convex.
+
+The search starts from the nominal stiffness of each bearing, which is that at the share `NOMINAL_LOAD` of its basic
+dynamic rating (`exugear.system.bearings.stiffness`). The static state is solved twice, because the rolling elements of
+a cage that stands still are placed by the direction of the load: first as for loads along x, then for the loads found.
+The second state gives the operating points. In static states bearings keep their rows. In motion a linear bearing has
+the tangent of its rows at the operating point and passes through it, so that its static state is the same.
 
 In motion the mean over the revolution of each carrier is relevant, which equal planets give at a single angle: bearings
 of planets get the mean of their set. Planets with unequal pins or spacing are evaluated over the whole revolution.
@@ -83,8 +87,8 @@ def linearise_at_static_load(assembly: Assembly, like: Assembly | None = None) -
     -------
     Assembly
         With the operating points of its catalogue bearings. Those without `radial_load_kN` in the file follow their
-        rows at rest; in motion linear ones have the stiffness there and pass that point, non-linear ones keep their
-        rows.
+        rows in static states. In motion linear ones have the stiffness of their operating point and pass through it,
+        non-linear ones keep their rows.
 
     Raises
     ------
@@ -97,16 +101,16 @@ def linearise_at_static_load(assembly: Assembly, like: Assembly | None = None) -
     if near is None and like is not None and like.known_rest and like.coordinates == assembly.coordinates:
         near = like.known_rest[0]
     q, searched = _loaded_state(assembly, near)
-    nominal = _points(assembly, searched, assembly.support_strains(q))
-    resting, laws = _resting(assembly, nominal)
-    q = _balance(resting, laws, near=q)
-    here = _state(resting, laws, q)
-    moving, spread = _lasting_laws(resting, laws, here, _states_over_turns(resting, laws, here))
+    first_points = _points(assembly, searched, assembly.support_strains(q))
+    at_rest, laws = _with_placed_rows(assembly, first_points)
+    q = _balance(at_rest, laws, near=q)
+    static = _state(at_rest, laws, q)
+    in_motion, spread = _laws_in_motion(at_rest, laws, static, _states_over_turns(at_rest, laws, static))
     linearised = replace(
-        resting,
-        connectors=moving,
-        connectors_at_rest=resting.connectors,
-        operating_points=here.points,
+        at_rest,
+        connectors=in_motion,
+        connectors_at_rest=at_rest.connectors,
+        operating_points=static.points,
         planet_spread=spread,
     )
     linearised.known_rest.append(q)
@@ -227,7 +231,9 @@ def _point(support: Bearing, bodies: dict[str, Body], law: SupportLaw, strain: F
     return operating_point(support, displacement, load_stands_still(support, bodies), law.phase)
 
 
-def _resting(assembly: Assembly, points: Sequence[OperatingPoint | None]) -> tuple[Assembly, tuple[SupportLaw, ...]]:
+def _with_placed_rows(
+    assembly: Assembly, points: Sequence[OperatingPoint | None]
+) -> tuple[Assembly, tuple[SupportLaw, ...]]:
     """Assembly with the rows of all catalogue bearings, placed by their loads, and their laws."""
     time = assembly.gearbox.damping_times.bearing
     laws = tuple(
@@ -247,34 +253,34 @@ def _state(assembly: Assembly, laws: Sequence[SupportLaw], q: Floats) -> _Suppor
 
 
 def _states_over_turns(
-    assembly: Assembly, laws: Sequence[SupportLaw], here: _SupportState
+    assembly: Assembly, laws: Sequence[SupportLaw], static: _SupportState
 ) -> dict[str, list[_SupportState]]:
     """States over the turn of each carrier with unequal planets, from that at the angles zero."""
     over_turns: dict[str, list[_SupportState]] = {}
     equal = _equal(assembly)
     unequal = [planets for planets in planet_families(assembly.bodies) if planets not in equal]
     for carrier in sorted({planets[0].carrier or "" for planets in unequal}):
-        over_turns[carrier] = [here]
+        over_turns[carrier] = [static]
         for turn in 2.0 * math.pi / CARRIER_ANGLES * np.arange(1, CARRIER_ANGLES):
             about = rolled_coordinates(assembly, carrier, float(turn))
             over_turns[carrier].append(_state(assembly, laws, _balance(assembly, laws, about)))
     return over_turns
 
 
-def _lasting_laws(
-    assembly: Assembly, laws: Sequence[SupportLaw], here: _SupportState, over_turns: dict[str, list[_SupportState]]
+def _laws_in_motion(
+    assembly: Assembly, laws: Sequence[SupportLaw], static: _SupportState, over_turns: dict[str, list[_SupportState]]
 ) -> tuple[ConnectorArrays, float]:
-    """Connectors with the laws that last in motion, and how far bearings of equal planets were apart in stiffness."""
+    """Connectors with the laws of motion, and the largest relative change of stiffness that made planets equal."""
     bodies = _bodies(assembly)
     time = assembly.gearbox.damping_times.bearing
-    all_around = [state for states in over_turns.values() for state in states] or [here]
+    all_around = [state for states in over_turns.values() for state in states] or [static]
     equal = {planet.name for planets in _equal(assembly) for planet in planets}
     found = []
     for n, (support, law) in enumerate(zip(assembly.supports, laws, strict=True)):
         if not is_catalogued(support) or support.model == "iso16281":
             found.append(law)
             continue
-        states = [here] if support.body in equal else over_turns.get(bodies[support.body].carrier or "", all_around)
+        states = [static] if support.body in equal else over_turns.get(bodies[support.body].carrier or "", all_around)
         points = [state.points[n] for state in states]
         of_rows = np.mean([point.stiffness for point in points if point is not None], axis=0)
         strain, load = np.mean([(state.strain[n], state.load[n]) for state in states], axis=0)

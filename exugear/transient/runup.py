@@ -1,4 +1,4 @@
-"""Load cases in time: start in balance, integrate, stream the results.
+"""Integration of a load case over time, a run-up or any other: start in balance, integrate, stream the results.
 
 Two solvers take the same assembly: `exugear.transient.compiled.solver`, and Exudyn as the model of record. Both hand
 their states to one `exugear.transient.recorder.Recorder`, which filters, accounts for energy and writes. Without a step

@@ -1,4 +1,4 @@
-"""What is kept: files sealed with a checksum, stores by key, and what is computed once for all folders.
+"""Storage of results: files sealed with a checksum, files by the hash of their input, and a cache for all folders.
 
 HDF5 hangs, crashes or misreads when it is given damaged bytes, and crashes when the disk is full. So it never meets
 either: content is made in memory or written through `ErrorKeeper`, and a file is opened only after its last line, the

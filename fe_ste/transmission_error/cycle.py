@@ -1,4 +1,4 @@
-"""Harmonics of a curve over the mesh cycle, and the error of its peak-to-peak value from the number of positions."""
+"""Curves over the mesh cycle: their harmonics, number of positions, and the error of the peak-to-peak value from it."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ import numpy as np
 
 from fe_ste.tools.arrays import Floats
 
+DEFAULT_POSITIONS = 50
+"""Positions of the mesh cycle unless stated: in eight of the nine pairs of docs/validation/te_accuracy.md, the
+peak-to-peak transmission error is within 1.4 % of that of 200 positions."""
 HARMONICS = 4
 """Harmonics that are listed."""
 

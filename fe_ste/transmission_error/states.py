@@ -20,6 +20,7 @@ from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Booleans, Floats, Integers
 from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 from fe_ste.transmission_error.compliance import PairCompliance
+from fe_ste.transmission_error.cycle import DEFAULT_POSITIONS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -83,7 +84,7 @@ class StateAxes(ReprMixin):
         cls,
         pair: GearPair,
         torque: float | Sequence[float],
-        positions: int = 50,
+        positions: int = DEFAULT_POSITIONS,
         centre_distance: float | Sequence[float] | None = None,
         misalignment: float | Sequence[float] = 0.0,
     ) -> StateAxes:

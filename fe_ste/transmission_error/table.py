@@ -30,6 +30,7 @@ from fe_ste.tools.stores import Layout, load_dataset, write_dataset
 from fe_ste.tools.threads import Workers
 from fe_ste.tools.versions import TABLE
 from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
+from fe_ste.transmission_error.cycle import DEFAULT_POSITIONS
 from fe_ste.transmission_error.diagrams import draw_table
 from fe_ste.transmission_error.grid import Checkpoint, GridExecutor, solve_grid
 from fe_ste.transmission_error.search import unloaded_states
@@ -72,7 +73,7 @@ class TableInput(ReprMixin):
     pair: GearPair
     torque: tuple[float, ...]
     """Static torques on gear 1, N m."""
-    positions: int = 50
+    positions: int = DEFAULT_POSITIONS
     """Positions of the mesh cycle."""
     centre_distance: tuple[float, ...] = ()
     """m; empty for the pair's own."""

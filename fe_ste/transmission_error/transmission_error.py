@@ -21,6 +21,7 @@ from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.threads import one_dense_thread, side_by_side
 from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
+from fe_ste.transmission_error.cycle import DEFAULT_POSITIONS
 from fe_ste.transmission_error.search import contact_states, new_start
 from fe_ste.transmission_error.states import StateAxes, StateResults
 
@@ -34,7 +35,7 @@ _CLOSE_POSITIONS = 20
 def static_transmission_error(
     pair: GearPair | PairCompliance,
     torque: float | Sequence[float],
-    positions: int = 50,
+    positions: int = DEFAULT_POSITIONS,
     *,
     centre_distance: float | Sequence[float] | None = None,
     misalignment: float | Sequence[float] = 0.0,

@@ -35,6 +35,7 @@ from exugear.gearbox.sections.excitations import ExcitationSection
 from exugear.gearbox.sections.gears import DeviationSection, GearSection, PairSection, PinSection
 from exugear.gearbox.sections.loads import LoadsSection, LubricantSection, RatingSection
 from exugear.gearbox.sections.measurements import MeasurementSection
+from fe_ste.transmission_error.cycle import DEFAULT_POSITIONS
 
 
 class LoadCaseSection(Section):
@@ -243,7 +244,7 @@ _Offsets = Annotated[tuple[q.OffsetUm, ...], Field(strict=False, max_length=50)]
 class SteSection(Section):
     """Settings of the finite-element tables; the axes apply to tables with ``grid``."""
 
-    positions: q.Positions = 50
+    positions: q.Positions = DEFAULT_POSITIONS
     """Number of positions over the mesh cycle."""
     method: Literal["superelement", "nonlinear"] = "superelement"
     """Method of `exugear ste` without `--method`."""

@@ -1,7 +1,8 @@
-"""The resonance that a report leads with: its mode, its cause, and what could change it.
+"""The resonance that a report leads with: its mode and its cause.
 
 All statements are about the first resonance of one `Ranking`: that of the most informative steady-state response, or
-else of a run-up, or else an estimate from modes and static transmission errors.
+else of a run-up, or else an estimate from modes and static transmission errors. `exugear.report.sections.answer` writes
+the text about it, with the design changes that reduce it.
 """
 
 from __future__ import annotations

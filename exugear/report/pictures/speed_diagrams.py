@@ -267,7 +267,7 @@ class CampbellDrawing:
     words: str
 
 
-def campbell_of(
+def campbell_drawing(
     ranking: Ranking,
     lines: Iterable[tuple[OrderLine, str]],
     frequencies: Floats,

@@ -22,7 +22,7 @@ from exugear.report.findings.headline import Headline
 from exugear.report.findings.ranking import HOUSING, SHAFTS, Ranking, Resonance, is_over_speed
 from exugear.report.findings.resonance_list import ListedResonance
 from exugear.report.findings.words import QUANTITIES, figure_text, percentages, rounded_text
-from exugear.report.pictures.speed_diagrams import NUMBERED, CampbellDrawing, campbell_of
+from exugear.report.pictures.speed_diagrams import NUMBERED, CampbellDrawing, campbell_drawing
 from exugear.report.sections.material import ChartAxis, Curve, Part, ReportData, model_name
 from exugear.report.sections.measured import measured_run_ups
 from exugear.report.sections.run_data import is_found_always
@@ -335,7 +335,7 @@ def _campbells(
     words = "Orders are lines through the origin, modes are horizontal lines; circles have the numbers of the list."
     shown = replace(ranking, resonances=drawn)
     known = matched if modes is not None else {}
-    return [campbell_of(shown, lines, frequencies, known, rated, size, words) for size in CAMPBELL]
+    return [campbell_drawing(shown, lines, frequencies, known, rated, size, words) for size in CAMPBELL]
 
 
 # All modes of each model

@@ -2,7 +2,8 @@
 
 A body's matrices fall into blocks: for a shaft two planes of bending, torsion and stretching. Each block works on its
 own coordinates, gathered from the state; gyroscopic forces come from the velocities of a partner block, times the
-spin speed Omega = s . v that the body's momentum about its axis defines. Nothing is allocated here.
+spin speed Omega = s . v that the body's momentum about its axis defines. Compiled functions allocate nothing: they work
+in memory that the caller takes from `scratch_for`.
 
 Seats have the coordinates of `exugear.system.kernels.coordinates`; what vibrates between them, modal ones.
 """
@@ -179,8 +180,8 @@ def set_elastic_motion(
 ) -> float:
     """Fill the accelerations of all elastic bodies under generalized forces f, their own forces left out, into out.
 
-    As `add_elastic_forces` and `set_elastic_accelerations` together. `scratch` is that of `scratch_for`. Returns the
-    power that the bodies damp (W) if asked for, else 0. Nothing is done without elastic bodies (None).
+    The forces are those of `add_elastic_forces`. `scratch` is that of `scratch_for`. Returns the power that the bodies
+    damp (W) if asked for, else 0. Nothing is done without elastic bodies (None).
     """
     damped = 0.0
     if elastic is None:
@@ -213,7 +214,7 @@ def set_elastic_motion(
 
 @kernel
 def motion_energies(q: Floats, v: Floats, elastic: ElasticMotion | None, scratch: Floats) -> tuple[float, float]:
-    """Kinetic and elastic energy as of `elastic_energies`, from blocks arranged for speed; None: no such bodies."""
+    """Kinetic and elastic energy of all elastic bodies, J, from blocks arranged for speed; zero without any (None)."""
     kinetic = 0.0
     stored = 0.0
     if elastic is None:

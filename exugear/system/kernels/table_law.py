@@ -9,7 +9,7 @@ below s at no load the flanks are separated. With the complementary energy U*(F)
 so that one potential gives the mesh force, the force between the axes and the moment caused by misalignment. The
 opposite flank has the same surface seen from the other end of the gear: gamma changes its sign.
 
-All memory is passed in; nothing is allocated here.
+The functions of the law allocate nothing: they work in memory that the caller takes from `scratch_memory`.
 """
 
 from __future__ import annotations

@@ -1,9 +1,11 @@
 """Equations of motion as one compiled piece that allocates nothing.
 
-The laws are those of `exugear.system.kernels`, which the tests hold them against; here they are arranged for speed:
-every sine is taken once per evaluation, constant entries that are zero are left out, bearing forces are collected per
-body before they are turned into generalized ones. Bodies without a coordinate point to one that stays zero, so that the
-loops need no exceptions.
+Forces of meshes are computed by `exugear.system.tooth_mesh.laws.mesh_forces`; those of flexible bodies, rolling
+elements, modal damping, seats that travel and varying loads by functions of `exugear.system.kernels`. Connectors,
+springs and the accelerations of rigid bodies are written again here for speed: every sine is taken once per evaluation,
+constant entries that are zero are left out, bearing forces are collected per body before they are turned into
+generalized ones. Tests compare the accelerations with those of the plain functions. Bodies without a coordinate point
+to one that stays zero, so that the loops need no exceptions.
 
 Each place has eight numbers x y z 0 a b spin 0 (see `exugear.system.kernels.coordinates`) and their rates behind, two
 vectors of four each, as the processor takes them; forces likewise. Machine code is kept by `fe_ste.tools.compilation`.

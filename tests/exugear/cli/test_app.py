@@ -28,6 +28,7 @@ from exugear.system.tooth_mesh.tables import requested_tables
 from fe_ste.elasticity.gear_mesh import ContactMesh
 from fe_ste.reference.position import NonlinearSettings
 from fe_ste.reference.table import NonlinearInput
+from fe_ste.transmission_error.cycle import DEFAULT_POSITIONS
 from fe_ste.transmission_error.table import MeshTable
 
 from ..cases.command import exugear
@@ -125,6 +126,11 @@ def test_every_command_is_offered_once():
     assert [command.callback.__name__ for command in app.registered_commands] == [
         place.partition(".")[2] for place in COMMANDS
     ]
+
+
+def test_the_help_of_ste_names_the_default_number_of_positions():
+    # The help starts without NumPy, so that it cannot take the number from where it is defined.
+    assert f"else {DEFAULT_POSITIONS};" in " ".join(inspect.getsource(models.ste).split())
 
 
 def test_no_help_text_loses_a_section_in_brackets_as_if_it_were_markup():

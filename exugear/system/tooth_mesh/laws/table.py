@@ -9,7 +9,7 @@ Damping is a time times the tangent of the potential at a frozen position, along
 tangent causes no damping (`exugear.system.kernels.table_law.surface_damping`). It vanishes as the teeth lose contact.
 Teeth are separated within the backlash; beyond it the other flank touches. A table applies to the flank s = +1; the
 flank s = -1 is the same rotated by pi about the line of centres: the same table with misalignment reversed. The force
-has two forms, `table_force` with its tangent, and `fast_table_force` for the compiled solver; tests check that they
+has two forms, `add_table_flank` with its tangent, and `fast_table_force` for the compiled solver; tests check that they
 agree.
 """
 
@@ -214,6 +214,11 @@ def table_flank(
 ) -> tuple[int, float, float, float, float, float, float]:
     """Law of one flank of mesh m by its readings, in the axes of the table; `law_memory` and `damping` are left filled.
 
+    Parameters
+    ----------
+    guess : load piece where the search begins
+    wanted : number of derivatives of the surface, in the order of `ORDERS`
+
     Returns
     -------
     piece, t : as of `surface_law`
@@ -299,14 +304,20 @@ def fast_flank_force(
     law_memory: Scratch,
     memory: MeshMemory,
 ) -> None:
-    """Add the part of one flank (1, -1) of a mesh with a table to `memory.states`; its force to `memory.gradient`.
+    """Add the part of one flank of a mesh with a table to `memory.states`; its force to `memory.gradient`.
 
     The latter is the negative generalized force. The states already contain the change of centre distance; the loaded
-    flank stores deflection, rate and misalignment there. c and s are cosine and sine of the frame's angle.
+    flank stores deflection, rate and misalignment there.
+
+    Parameters
+    ----------
+    side : 1 for the loaded flank of the static state, -1 for the opposite one
+    c, s : cosine and sine of the frame's angle
     """
     index, axis, state = meshes.coordinates[m], meshes.axis[m], memory.states[m]
     gradient, total = memory.gradient[ALONG_DEFLECTION], memory.gradient[TABLE_FORCE]
     deflection = table.nominal[m, NOMINAL_DEFLECTION]
+    # `number` is the column of the flank in `memory.pieces`.
     if side > 0:
         row, misalignment_row, offset = meshes.arrays.deflection[m], table.misalignment[m], deflection
         phase, cycles, number = meshes.arrays.phase[m], meshes.arrays.cycles[m], 0
@@ -327,11 +338,13 @@ def fast_flank_force(
         state[DEFLECTION], state[RATE], state[MISALIGNMENT] = delta, rate, misalignment
     if delta <= table.lowest[m]:
         return
+    # Sign between the misalignment of the gears and that of the table, which belongs to the flank +1 of gear 1.
     sense = side * table.sense[m]
     pmc = phase + cycles * (q[index[SPIN_1]] - q[index[FRAME]])
     centre = table.nominal[m, NOMINAL_DISTANCE] + state[CENTRE_CHANGE]
-    # From step to step the load stays on a piece: the search begins where it ended.
+    # Number of derivatives of the surface: gears that only spin are damped along the deflection alone.
     wanted = ENERGY_DERIVATIVES if spinning else DAMPING_DERIVATIVES
+    # From step to step the load stays on a piece: the search begins where it ended.
     memory.pieces[m, number], _, force, apart, along_tilt, _, lost = table_flank(
         m,
         delta,

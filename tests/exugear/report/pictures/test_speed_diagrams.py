@@ -12,7 +12,7 @@ import pytest
 from exugear.gearbox.units import RPM
 from exugear.report.findings.ranking import Envelope, Limit, PeakAmplitude, Ranking, Resonance
 from exugear.report.pictures.shapes import BodyShape, TriangleSurface
-from exugear.report.pictures.speed_diagrams import TOP, campbell_of, strips_of
+from exugear.report.pictures.speed_diagrams import TOP, campbell_drawing, strips_of
 from exugear.report.pictures.still import SIZE, mode_picture
 from exugear.results.spectra.waterfall import OrderLine
 
@@ -53,12 +53,12 @@ def test_a_run_at_constant_speed_and_infinite_values_are_drawn_all_the_same():
     (strip,) = drawn.strips
     places = [*strip.bands[0], strip.circles[0].x, strip.circles[0].y]
     assert np.isfinite(places).all() and drawn.frame.span is None
-    assert campbell_of(ranking, [(MESH, "mesh")], np.zeros(0), {}, None, (600.0, 400.0), "").circles
+    assert campbell_drawing(ranking, [(MESH, "mesh")], np.zeros(0), {}, None, (600.0, 400.0), "").circles
 
 
 def test_the_campbell_diagram_reaches_beyond_the_range_and_its_circles_lie_on_orders():
     frequencies = np.array([0.0, 80.5, 100.2, 129.0, 500.0])
-    drawn = campbell_of(RANKING, [(MESH, "mesh")], frequencies, {1: 2, 2: 1}, 90.0, (600.0, 400.0), "")
+    drawn = campbell_drawing(RANKING, [(MESH, "mesh")], frequencies, {1: 2, 2: 1}, 90.0, (600.0, 400.0), "")
     frame = drawn.frame
     assert frame.speeds[1] > 120.0
     assert [excited for _, excited in drawn.modes] == [True, True, False]  # up to 130 Hz: 1.3 times 100 Hz
