@@ -651,7 +651,7 @@ def growth_at(balance: HarmonicResidual, readings: Complexes, base: int, least: 
     reads = reads[read]
     found, shapes = exponents(constant, pushes, reads, varying, period)
     # Free rolling neither grows nor decays but for what the losses change with the speed: it is known by its shape.
-    return float(np.delete(found, most_rolling(system, shapes)).real.max())
+    return float(np.delete(found, most_rolling(system, shapes[:size])).real.max())
 
 
 def growth_of_state(balance: HarmonicResidual, readings: Complexes, parted: bool) -> float:

@@ -6,16 +6,18 @@ With the averaged mass and the damping and stiffness at the angle psi = W t of t
 
 the state x = (u, u') is multiplied by a matrix X in each passage, whose eigenvalues are exp(exponent x period). X is a
 product of exponentials of the system at the middle of each of many steps: exact where nothing varies, and of second
-order in what varies within a step. Large systems are reduced to the modes of lowest frequency of the averaged system,
-of which all but the damping of the highest hardly depends on the rest.
+order in what varies within a step. Large systems are reduced to the undamped modes of lowest frequency of the averaged
+system.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import scipy.linalg
 
-from exugear.steady.mean_system.mean_system import MeanSystem, most_rolling, vibrations
+from exugear.steady.mean_system.mean_system import MeanSystem, most_rolling
 from exugear.system.modes import state_matrix
 from fe_ste.tools.arrays import Complexes, Floats
 
@@ -23,7 +25,7 @@ STEPS = 96
 """Steps of a passage: twice as many change the exponents of a set of two planets by less than 1e-3 1/s."""
 LARGEST = 100
 """Coordinates from which the system is reduced."""
-MODES = 40
+MODES = 60
 """Modes that are kept then."""
 
 
@@ -32,46 +34,58 @@ def growth_over_carrier(system: MeanSystem, speed: float) -> float:
 
     Free rolling is left out. Stiffness has to vary with the angle of the carrier: `MeanSystem.over_angle`.
     """
-    dampings, stiffnesses = _at_steps(system, speed)
-    places = system.frame.places
-    step = float(places[1] * len(places)) / abs(speed) / STEPS
-    if system.size > LARGEST:
-        passage = _of_modes(system, speed, dampings, stiffnesses, step)
-        multipliers = scipy.linalg.eigvals(passage)
-    else:
-        passage = np.eye(2 * system.size)
-        for damping, stiffness in zip(dampings, stiffnesses, strict=True):
-            passage = scipy.linalg.expm(step * state_matrix(system.mass, damping, stiffness)) @ passage
-        multipliers, shapes = scipy.linalg.eig(passage)
-        multipliers = np.delete(multipliers, most_rolling(system, shapes))
-    return float(np.log(np.abs(multipliers).max()) / (STEPS * step))
-
-
-def _at_steps(system: MeanSystem, speed: float) -> tuple[Floats, Floats]:
-    """Find C and K (steps, size, size) at the middle of each step of a passage, by Fourier series over the angle."""
     assert system.over_angle is not None
+    places = system.frame.places
+    period = float(places[1] * len(places)) / abs(speed)
+    basis = _basis(system, speed)
+    mass = basis.T @ system.mass @ basis
     dampings, stiffnesses = system.over_angle[0], system.at(system.over_angle[1], speed)
-    count = len(dampings)
+    dampings = basis.T @ (system.damping_at(speed) + dampings - dampings.mean(axis=0)) @ basis
+    stiffnesses = basis.T @ (system.stiffness_at(speed) + stiffnesses - stiffnesses.mean(axis=0)) @ basis
+    found, shapes = exponents_of_turning(mass, dampings, stiffnesses, math.copysign(period, speed))
+    return float(np.delete(found, most_rolling(system, basis @ shapes)).real.max())
+
+
+def exponents_of_turning(
+    mass: Floats, dampings: Floats, stiffnesses: Floats, period: float
+) -> tuple[Complexes, Complexes]:
+    """Return Floquet exponents (2 n,), 1/s, and shapes (n, 2 n), by columns, of C and K that vary over a turn.
+
+    Parameters
+    ----------
+    mass : (n, n)
+    dampings, stiffnesses : (p, n, n) at p angles that are evenly spread over the turn
+    period : of the turn, s; negative where the angle decreases
+
+    Examples
+    --------
+    >>> stiffnesses = np.full((3, 1, 1), 100.0)
+    >>> exponents_of_turning(np.eye(1), np.full((3, 1, 1), 2.0), stiffnesses, 0.1)[0].real.round(6)
+    array([-1., -1.])
+    """
+    step = abs(period) / STEPS
+    weights = _weights(len(dampings), math.copysign(1.0, period))
+    passage = np.eye(2 * len(mass))
+    for own in weights:
+        constant = state_matrix(mass, np.tensordot(own, dampings, axes=1), np.tensordot(own, stiffnesses, axes=1))
+        passage = scipy.linalg.expm(step * constant) @ passage
+    multipliers, shapes = scipy.linalg.eig(passage)
+    return np.log(multipliers.astype(np.complex128)) / abs(period), shapes[: len(mass)]
+
+
+def _basis(system: MeanSystem, speed: float) -> Floats:
+    """Find the columns (size, n) that span the motion: all coordinates, or undamped modes of the averaged system."""
+    if system.size <= LARGEST:
+        return np.eye(system.size)
+    stiffness = system.stiffness_at(speed)
+    shapes = scipy.linalg.eigh(0.5 * (stiffness + stiffness.T), system.mass, subset_by_index=(0, MODES - 1))[1]
+    return np.asarray(shapes)
+
+
+def _weights(count: int, sense: float) -> Floats:
+    """Weights (steps, count) of values at even angles for those at the middle of each step, by Fourier series."""
     turns = np.fft.fftfreq(count, 1.0 / count)
-    middle = 2.0 * np.pi * (np.arange(STEPS) + 0.5) / STEPS * np.sign(speed)
-    # Of an even number of places the highest harmonic is a cosine.
-    phases = np.where(2 * turns == -count, np.cos(np.outer(middle, turns)), np.exp(1j * np.outer(middle, turns)))
-    weights = (phases @ np.fft.fft(np.eye(count), axis=0)).real / count - 1.0 / count
-    return (
-        system.damping_at(speed) + np.tensordot(weights, dampings, axes=1),
-        system.stiffness_at(speed) + np.tensordot(weights, stiffnesses, axes=1),
-    )
-
-
-def _of_modes(system: MeanSystem, speed: float, dampings: Floats, stiffnesses: Floats, step: float) -> Complexes:
-    """Multiply the amplitudes of the lowest modes and of their conjugates (2 modes, 2 modes) over a passage."""
-    mean = system.damping_at(speed), system.stiffness_at(speed)
-    values, right, left = (own[:MODES] for own in vibrations(system.mass, *mean))
-    size = system.size
-    shapes = np.concatenate([right, right.conj()])
-    felt = np.concatenate([left, left.conj()])[:, size:] @ np.linalg.inv(system.mass)
-    passage: Complexes = np.eye(len(shapes), dtype=complex)
-    for damping, stiffness in zip(dampings, stiffnesses, strict=True):
-        forces = (damping - mean[0]) @ shapes[:, size:].T + (stiffness - mean[1]) @ shapes[:, :size].T
-        passage = scipy.linalg.expm(step * (np.diag(np.append(values, values.conj())) - felt @ forces)) @ passage
-    return passage
+    angles = np.outer(sense * 2.0 * np.pi * (np.arange(STEPS) + 0.5) / STEPS, turns)
+    # Of an even number of angles the highest harmonic is a cosine.
+    phases = np.where(2 * turns == -count, np.cos(angles), np.exp(1j * angles))
+    return np.asarray((phases @ np.fft.fft(np.eye(count), axis=0)).real / count)

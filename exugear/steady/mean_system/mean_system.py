@@ -594,13 +594,12 @@ def _checked_change(here: Floats, there: Floats, most: float) -> float:
 
 
 def most_rolling(system: MeanSystem, shapes: Complexes) -> Integers:
-    """Return the places of the shapes (2 size, n), by columns, that have the largest share of rolling in their energy."""
+    """Return which of some shapes (size, n), by columns, have the largest share of rolling in their energy."""
     frame = system.frame
     turning = frame.assembly.rolling_velocity(np.zeros(system.size), frame.speeds)
     along = system.mass @ np.linalg.solve(frame.matrices(0.0)[0], turning)
-    moved = shapes[: system.size]
-    energy = np.sqrt(np.abs(np.sum(moved.conj() * (system.mass @ moved), axis=0)))
-    return np.asarray(np.argsort(-np.abs(along @ moved) / np.maximum(energy, 1e-300))[:ROLLING])
+    energy = np.sqrt(np.abs(np.sum(shapes.conj() * (system.mass @ shapes), axis=0)))
+    return np.asarray(np.argsort(-np.abs(along @ shapes) / np.maximum(energy, 1e-300))[:ROLLING])
 
 
 # Modes of the mean system at one speed: eigenvalues with right and left shapes, gyroscopic and damped as it is
