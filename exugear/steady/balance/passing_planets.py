@@ -44,8 +44,10 @@ class SolvedGroups(NamedTuple):
     """(g, n) whether a line is taken in as its conjugate."""
     factors: list[tuple[Complexes, Integers]]
     """g of the equation (n s, n s) of the readings that vary, as `scipy.linalg.lu_factor` gives them."""
-    forces: Complexes
-    """(g, n s, n s) forces along these readings."""
+    coupled: tuple[Integers, Integers, Integers]
+    """(p,) group, line, and line that it takes in, of each pair that is coupled."""
+    blocks: Complexes
+    """(p, s, s) forces of the first one along the readings of the other."""
     answers: Complexes
     """(g, n, k, s) all readings under a unit of each of these forces."""
 
@@ -161,14 +163,13 @@ class PassingPlanets:
         blocks = stiffness[turns] + self._of_damper[turns] @ rates[group, of]
         found = answers[places][..., self._at]
         answering = np.where(mirrored[..., None, None], found.conj(), found)
-        forces, matrix = np.zeros((2, groups, members, count, members, count), dtype=complex)
-        forces[group, to, :, of] = blocks
+        matrix = np.zeros((groups, members, count, members, count), dtype=complex)
         # Products of arrays that are not in C order are slow.
         own = np.ascontiguousarray(answering[:, :, self._at])
         matrix[group, to, :, of] = own[group, to] @ blocks
         matrices = matrix.reshape(groups, members * count, -1) + np.eye(members * count)
         factors = [scipy.linalg.lu_factor(own, overwrite_a=True, check_finite=False) for own in matrices]
-        return SolvedGroups(places, mirrored, factors, forces.reshape(matrices.shape), answering)
+        return SolvedGroups(places, mirrored, factors, (group, to, of), blocks, answering)
 
     def solve(self, right: Complexes) -> Complexes:
         """Solve the equation (n, k) in which the mesh cycle does not vary."""
@@ -180,8 +181,11 @@ class PassingPlanets:
                 scipy.linalg.lu_solve(factor, b, check_finite=False)
                 for factor, b in zip(group.factors, varying, strict=True)
             ]
-            forces = (group.forces @ np.array(own)[..., None]).reshape(*given.shape[:2], -1, 1)
-            solved = given - (group.answers @ forces)[..., 0]
+            found = np.array(own).reshape(*given.shape[:2], -1)
+            at, to, of = group.coupled
+            forces = np.zeros_like(found)
+            np.add.at(forces, (at, to), (group.blocks @ found[at, of, :, None])[..., 0])
+            solved = given - (group.answers @ forces[..., None])[..., 0]
             out[group.lines[group.mirrored]] = solved[group.mirrored].conj()
             out[group.lines[~group.mirrored]] = solved[~group.mirrored]
         return out

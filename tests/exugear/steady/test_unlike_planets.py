@@ -21,7 +21,7 @@ from exugear.system.build import assemble
 from exugear.system.statics import static_state
 
 from ..cases import gear_trains
-from ..cases.steady_runs import apart, fitted, solver_of
+from ..cases.steady_runs import apart, apart_over_time, fitted, solver_of
 
 CYCLE = 2.0 * np.pi * np.arange(50) / 50
 SHAPE = 1.0 + 0.08 * np.cos(CYCLE) + 0.03 * np.sin(2 * CYCLE)
@@ -121,18 +121,21 @@ def test_trains_with_unlike_planets_stay_on_their_steady_state(kind):
 @pytest.mark.parametrize(
     "more",
     [
-        {"pins": {"late": {"body": "planet_1", "tangential_um": 20.0, "radial_um": 8.0}}},
-        {"deviations": {"sun": {"body": "sun", "gear": "sun", "runout_um": 20.0}}},
-        {"excitations": {"ripple": {"body": "sun", "orders": [5], "torque_N_m": [5.0]}}},
+        {"pins": {"late": {"body": "planet_1", "tangential_um": 4.0, "radial_um": 2.0}}},
+        {"deviations": {"sun": {"body": "sun", "gear": "sun", "runout_um": 5.0}}},
+        {"excitations": {"ripple": {"body": "sun", "orders": [5], "torque_N_m": [1.0]}}},
         {"excitations": {"balance": {"body": "planet_2", "z_mm": 0.0, "unbalance_g_mm": 300.0}}},
     ],
     ids=["displaced pin", "run-out", "torque ripple", "unbalance of a planet"],
 )
 def test_other_excitations_stay_on_the_steady_state_of_two_planets(more):
-    """As above; a pin is part of the static state here, since each planet has its own."""
+    """As above, over time: orders of sun and carrier coincide. All are small enough to be linear.
+
+    A pin is part of the static state here, since each planet has its own.
+    """
     assembly = train(on_unlike_bearings(gear_trains.planetary("ring", 2)), **more)
-    solver = solver_of(assembly, (45.0, 180.0), "parametric", 4)
-    assert apart(solver, 90.0, 1.6, 1.0 / 60e3, 0.8, assembly)[1] < 2e-3
+    solver = solver_of(assembly, (45.0, 180.0), "parametric", 6)
+    assert apart_over_time(solver, 90.0, 1.6, 1.0 / 60e3, 0.8, assembly) < 3e-3
 
 
 def test_the_power_of_the_meshes_is_what_the_dampers_dissipate():
