@@ -131,6 +131,7 @@ def damping_limits(system: MeanSystem) -> tuple[MeanSystem, MeanSystem]:
     present = system.at(system.damping, 0.0)
     present = 0.5 * (present + present.T)
     changes = [(factor - 1.0) * present for factor in FACTORS]
+    factors = FACTORS
     if band is not None:
         # Dampers with stated values are no less certain than the rest of the model, and stay.
         turned = system.frame.matrices(0.0)[0]
@@ -139,10 +140,12 @@ def damping_limits(system: MeanSystem) -> tuple[MeanSystem, MeanSystem]:
         undamped = replace(assembly, modal=None)
         limits = (modal_matrix(still, with_modal_damping(undamped, percent).modal) for percent in band)
         changes = [turned.T @ (limit - now) @ turned for limit in limits]
-    return (
-        replace(system, damping=system.damping + changes[0]),
-        replace(system, damping=system.damping + changes[1]),
+        factors = (1.0, 1.0)
+    lowest, highest = (
+        replace(system, damping=system.damping + change, damper_factor=factor)
+        for change, factor in zip(changes, factors, strict=True)
     )
+    return lowest, highest
 
 
 def _highest_peaks(

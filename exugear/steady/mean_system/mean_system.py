@@ -89,6 +89,9 @@ class MeanSystem(ReprMixin):
     """C (p, size, size) and K (3, p, size, size) less those at zero angle of the carrier, at p of its angles that are
     evenly spread over the passing of a planet, or of two; None where they are the mean ones at any angle."""
 
+    damper_factor: float = 1.0
+    """Factor on the dampers of meshes and bearings, which the damping has in it: of another end of its range."""
+
     def _line(self) -> str:
         return f": {self.size} coordinates, {self.speeds.min():.4g} to {self.speeds.max():.4g} rad/s"
 
@@ -576,15 +579,15 @@ def _changes_over_places(
             for n in (0, 2):
                 stiffnesses[n, place] = _stiffness(frame, psi, float(speeds[n]), static[n]) - stiffness[n]
             stiffnesses[1, place] = 0.5 * (stiffnesses[0, place] + stiffnesses[2, place])
-        largest = max(largest, _checked_change(still, turned, most))
+        largest = max(largest, _checked_change(turned - still, stiffness[1], most))
         report(place)
     return (masses, dampings, stiffnesses), largest
 
 
-def _checked_change(here: Floats, there: Floats, most: float) -> float:
+def _checked_change(changes: Floats, stiffness: Floats, most: float) -> float:
     """Find the change of stiffness with the carrier's angle, over it, and refuse more of it than a share."""
-    size = np.sqrt(np.abs(np.diag(here)).clip(min=1e-3 * np.abs(np.diag(here)).max()))
-    change = float(np.abs((there - here) / np.outer(size, size)).max())
+    size = np.sqrt(np.abs(np.diag(stiffness)).clip(min=1e-3 * np.abs(np.diag(stiffness)).max()))
+    change = float(np.abs(changes / np.outer(size, size)).max())
     if change > most:
         raise SteadyError(
             f"the stiffness varies by {100.0 * change:.2g} % over a carrier revolution (unequal planets, or a support "

@@ -197,7 +197,7 @@ class MeshWaves:
     @cached_property
     def damping(self) -> Floats:
         """Damping of each wave's mesh in the law's coordinate, (m,), N s/m."""
-        return np.array([self.assembly.meshes.damping[wave.first] for wave in self.waves])
+        return self.system.damper_factor * np.array([self.assembly.meshes.damping[wave.first] for wave in self.waves])
 
     @cached_property
     def line_of_action(self) -> Floats:
@@ -261,7 +261,9 @@ class MeshWaves:
         """
         meshes = self.assembly.meshes
         varying = np.array([self.system.frame.varies_at(m) for m in range(len(meshes.tilt))], dtype=bool)
-        return np.asarray(meshes.tilt[:, [TILT_STIFFNESS, TILT_DAMPING, TILT_MOMENT]] * varying[:, None])
+        found = meshes.tilt[:, [TILT_STIFFNESS, TILT_DAMPING, TILT_MOMENT]] * varying[:, None]
+        found[:, 1] *= self.system.damper_factor
+        return np.asarray(found)
 
     @property
     def moving(self) -> Booleans:

@@ -137,10 +137,10 @@ def varying_bearings(system: MeanSystem) -> UnequalBearings | None:
         coordinates=found.coordinates[of_coordinates],
         still=found.still[turning][:, of_coordinates],
         stiffness=found.stiffness[turning][:, of_coordinates][:, :, of_coordinates],
-        damping=found.damping[turning][:, of_coordinates][:, :, of_coordinates],
+        damping=system.damper_factor * found.damping[turning][:, of_coordinates][:, :, of_coordinates],
         signals_still=found.signals_still[turning],
         signals_stiffness=found.signals_stiffness[turning][..., of_coordinates],
-        signals_damping=found.signals_damping[turning][..., of_coordinates],
+        signals_damping=system.damper_factor * found.signals_damping[turning][..., of_coordinates],
     )
 
 

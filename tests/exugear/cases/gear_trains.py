@@ -223,6 +223,13 @@ def planetary(held: str, planets: int = 3) -> dict[str, Any]:
     return train.loaded(torques, [end], (begin, end), "ring" if held == "carrier" else "planet")
 
 
+def unevenly_spaced() -> dict[str, Any]:
+    """Three planets of which one stands 7.5 degrees beside its place: a multiple of 360 / (24 + 72) degrees."""
+    content = planetary("ring")
+    content["bodies"]["planet"]["planet_angles_deg"] = [0.0, 120.0, 247.5]
+    return content
+
+
 def differential() -> dict[str, Any]:
     """Sun and ring both drive the carrier, each at its own speed."""
     train = Train("differential").gear("sun", 24).gear("planet", 24).gear("ring", 72, internal=True)
@@ -343,6 +350,7 @@ KINDS: dict[str, Callable[[], dict[str, Any]]] = {
     "planetary, reversed torque": lambda: reversed_torque(planetary("ring")),
     "one planet": lambda: planetary("ring", 1),
     "two planets": lambda: planetary("ring", 2),
+    "planets, unevenly spaced": unevenly_spaced,
     "differential": differential,
     "stepped planets": stepped_planets,
     "meshing planets": meshing_planets,

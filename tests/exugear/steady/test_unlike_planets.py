@@ -25,13 +25,11 @@ from ..cases.steady_runs import apart, apart_over_time, fitted, solver_of
 
 CYCLE = 2.0 * np.pi * np.arange(50) / 50
 SHAPE = 1.0 + 0.08 * np.cos(CYCLE) + 0.03 * np.sin(2 * CYCLE)
-UNEVEN = [0.0, 120.0, 247.5]
-"""Places at which planets of 24 teeth mesh with a sun of 24 and a ring of 72: multiples of 360 / 96 degrees."""
 UNLIKE_HELD = {"matrix": np.diag([1e8, 3e8, 1e8, 1e6, 2e6, 0.0]).tolist()}
 """Stiffness of a bearing three times as high along y as along x."""
 
 
-def unevenly_spaced(content, angles=UNEVEN):
+def placed(content, angles):
     """Place the planets of a train at some angles, degrees."""
     for body in content["bodies"].values():
         if "planet_angles_deg" in body:
@@ -91,12 +89,12 @@ TRAINS = {
     "two planets": (gear_trains.planetary("ring", 2), 90.0),
     "two planets, backwards": (gear_trains.planetary("ring", 2), -90.0),
     "two planets, sun held": (gear_trains.planetary("sun", 2), 90.0),
-    "unevenly spaced": (unevenly_spaced(gear_trains.planetary("ring")), 90.0),
+    "unevenly spaced": (gear_trains.unevenly_spaced(), 90.0),
     "stepped planets, unevenly spaced": (
-        unevenly_spaced(gear_trains.stepped_planets(), [0.0, 120.0, 524 * 360.0 / 726]),
+        placed(gear_trains.stepped_planets(), [0.0, 120.0, 524 * 360.0 / 726]),
         90.0,
     ),
-    "meshing planets, two of each": (unevenly_spaced(gear_trains.meshing_planets(), [0.0, 180.0]), 90.0),
+    "meshing planets, two of each": (placed(gear_trains.meshing_planets(), [0.0, 180.0]), 90.0),
 }
 
 
@@ -149,7 +147,7 @@ def test_slow_planets_share_the_load_as_in_the_static_state():
 
     At a hundredth of the lowest natural frequency, stiffness constant over the cycle.
     """
-    assembly = train(unevenly_spaced(gear_trains.planetary("ring")), np.ones(1))
+    assembly = train(gear_trains.unevenly_spaced(), np.ones(1))
     solver = solver_of(assembly, (0.5, 2.0), "parametric", 2)
     lines = 2.0 * signals(solver.model, solver.response(1.0))
     lines[0] *= 0.5
@@ -164,7 +162,7 @@ def test_slow_planets_share_the_load_as_in_the_static_state():
 
 
 def test_a_stored_response_says_what_varies_and_how_planets_share_the_load():
-    assembly = train(on_unlike_bearings(unevenly_spaced(gear_trains.planetary("ring"))))
+    assembly = train(on_unlike_bearings(gear_trains.unevenly_spaced()))
     data = to_dataset(response_of(assembly, SteadySettings(SpeedRange(40.0, 60.0, 2), harmonics=2)))
     assert data.attrs["varying_carrier"] == "carrier"
     assert set(json.loads(data.attrs["load_sharing"])) == {"sun_planet", "planet_ring"}
