@@ -54,10 +54,6 @@ def inertia_sets(origin: Origin) -> tuple[str, ...]:
 def bodies(origin: Origin, inertias: str) -> tuple[Body, ...]:
     """All enabled bodies, with one body per planet.
 
-    Parameters
-    ----------
-    inertias : name of the inertia set
-
     Raises
     ------
     GearboxFileError

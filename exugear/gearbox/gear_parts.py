@@ -397,7 +397,6 @@ def pair_specs(
 
     Parameters
     ----------
-    sections, pairs : mappings of pair name
     modifications : by gear name
     mesh_forces : by pair name
         Static force F_bt of each enabled mesh, N; the force of the pair is the mean of their absolute values.

@@ -71,8 +71,6 @@ def named_file(name: str, folder: Path, permissions: Permissions, largest: int) 
 
     Parameters
     ----------
-    name : name in the gearbox file
-    folder : folder of the gearbox file
     largest : maximum size of the file, bytes
 
     Raises

@@ -84,7 +84,6 @@ def factors_of_run(assembly: Assembly, rating: RatingSection, path: Path, body: 
     Parameters
     ----------
     rating : with the load case of the run, and the minimum factor
-    path : file of the run
     body : loaded body, whose speed counts
 
     Raises
@@ -165,11 +164,6 @@ SMALLEST = 1e-4
 def factors(assembly: Assembly, rating: RatingSection, folder: Path, body: str) -> Mapping[str, DynamicFactor]:
     """Return the factors of mesh families from the source in the gearbox file, reading the results folder if necessary.
 
-    Parameters
-    ----------
-    folder : results folder
-    body : loaded body
-
     Raises
     ------
     GearboxFileError
@@ -211,7 +205,6 @@ def factors_of_response(assembly: Assembly, rating: RatingSection, path: Path, b
     Parameters
     ----------
     rating : with the method of the response, and the minimum factor
-    path : file of the response
     body : loaded body, whose speed counts
 
     Raises

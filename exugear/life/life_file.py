@@ -219,7 +219,6 @@ def stored_lives(gearbox: Gearbox, folder: Path, assembled: Callable[[Choice], A
 
     Parameters
     ----------
-    gearbox : gearbox of the folder
     assembled : returns the model for given settings
     """
     for path in sorted(folder.glob("*/*/life.nc")):
@@ -253,7 +252,6 @@ def draw_life(data: xr.Dataset, path: str | Path | None = None) -> Figure:
     Parameters
     ----------
     data : as `exugear.life.life_file.read_life` returns it
-    path : file for the picture
     """
     shown = [limit for limit in limits(data) if limit[2] > LEAST_DAMAGE][:SHOWN]
     with drawing_style():

@@ -235,7 +235,6 @@ def stored_studies(folder: Path, gearbox: Gearbox) -> Iterator[StoredStudy]:
 
     Parameters
     ----------
-    folder : results folder
     gearbox : gearbox to which the folder belongs
     """
     for path in sorted((folder / STUDIES).glob(f"*/{DATASET}")):

@@ -126,7 +126,6 @@ class RunPieces:
 
     Parameters
     ----------
-    folder : folder of the pieces
     attributes
         Attributes of a new run. If omitted, the run of the existing pieces is resumed.
 

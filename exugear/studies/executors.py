@@ -128,12 +128,7 @@ def number_of(value: Any) -> float:
 
 
 class Journal:
-    """Journal of this process in a folder, created with its first line.
-
-    Parameters
-    ----------
-    folder : of the study
-    """
+    """Journal of this process in a folder, created with its first line."""
 
     def __init__(self, folder: Path) -> None:
         host = re.sub(r"[^A-Za-z0-9]", "", platform.node())[:20] or "host"
@@ -164,7 +159,6 @@ def read_journals(folder: Path, wanted: Collection[str]) -> dict[str, Record]:
 
     Parameters
     ----------
-    folder : of the study
     wanted : hashes
     """
     journals: dict[str, Record] = {}

@@ -319,9 +319,9 @@ class PointResults:
         """
         if self.settings.steady is None:
             raise PointError("results of the steady-state response require a section [steady] with speeds")
-        from exugear.steady.steady_file import to_dataset
+        from exugear.steady.steady_file import to_dataset, with_names
 
-        return to_dataset(response_of(self.assembly, self.settings.steady, progress=_ignore_progress))
+        return with_names(to_dataset(response_of(self.assembly, self.settings.steady, progress=_ignore_progress)))
 
     @cached_property
     def run(self) -> xr.Dataset:

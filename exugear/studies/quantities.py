@@ -19,7 +19,7 @@ from exugear.gearbox.renames import STUDY_RENAMES, renamed_hint
 from exugear.gearbox.units import RPM
 from exugear.life.life_file import limits
 from exugear.steady.mean_system.signals import BODY_SPEED, COUPLING_TORQUE, SURFACE_VELOCITY, named_amplitudes
-from exugear.steady.peaks import line_name, peaks
+from exugear.steady.peaks import peaks
 from exugear.steady.steady_file import complex_amplitudes
 from exugear.studies.point_results import PointError, PointResults
 from exugear.system.modes import FREE_ROTATION, Modes
@@ -294,8 +294,7 @@ def _amplitudes(results: PointResults, signal: str) -> Floats:
 
 def _line(results: PointResults, name: str) -> int:
     """Return the index of an order by its name, such as ``2 x sun_planet``."""
-    bases = tuple(str(base) for base in results.steady["base"].to_numpy())
-    names = [line_name(tuple(int(n) for n in row), bases) for row in results.steady["index"].to_numpy()]
+    names = [str(own) for own in results.steady["line"].to_numpy()]
     if name not in names:
         raise PointError(f"no line {name!r}; lines are {', '.join(names[1:8])} and so on")
     return names.index(name)
@@ -627,7 +626,6 @@ def outputs_of(sections: Mapping[str, Mapping[str, Any]], known: Mapping[str, Ou
     Parameters
     ----------
     sections : by the name in the dataset: ``quantity`` and its options
-    known : available kinds of output
 
     Raises
     ------

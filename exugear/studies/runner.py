@@ -264,7 +264,6 @@ def optimise(
 
     Parameters
     ----------
-    folder : folder of the points and the dataset
     opens : callable, optional
         Starts workers; processes on all cores by default.
 

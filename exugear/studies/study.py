@@ -359,7 +359,6 @@ class Study(ReprMixin):
         Parameters
         ----------
         permissions : of the gearbox file
-        quantities : available kinds of output
 
         Raises
         ------

@@ -62,7 +62,6 @@ class EditServer(ThreadingHTTPServer):
 
     Parameters
     ----------
-    case, folder : gearbox file and results folder
     allow_dir : another folder whose files the gearbox file may name
     port : 0 for any free port
     """

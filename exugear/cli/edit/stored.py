@@ -39,12 +39,7 @@ class FileConflictError(Exception):
 
 
 class EditedFile:
-    """A gearbox file that a page edits and that other programs may change.
-
-    Parameters
-    ----------
-    case, folder : gearbox file and results folder
-    """
+    """A gearbox file that a page edits and that other programs may change."""
 
     def __init__(self, case: Path, folder: Path) -> None:
         self.case = case

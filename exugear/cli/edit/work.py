@@ -77,7 +77,6 @@ class LongWork:
 
     Parameters
     ----------
-    case, folder : gearbox file and results folder
     allow_dir : another folder whose files the gearbox file may name
     """
 

@@ -332,14 +332,7 @@ def write_spectra(counted: CountedLoads, folder: Path) -> list[Path]:
 
 
 def draw_duration(distribution: DurationDistribution, body: str, path: str | Path | None = None) -> Figure:
-    """Draw the load duration distribution of a body: hours in each bin, and hours above each torque.
-
-    Parameters
-    ----------
-    distribution : to draw
-    body : for the labels
-    path : file for the picture
-    """
+    """Draw the load duration distribution of a body: hours in each bin, and hours above each torque."""
     with drawing_style():
         figure = new_figure(7.0, 3.2)
         bars, above = figure.subplots(1, 2)

@@ -54,7 +54,6 @@ def load_duration(
     Parameters
     ----------
     torque, speed, hours : (samples,) N m, rad/s, and duration of each sample in the whole life
-    bins : number of bins for each sign
     largest : outer edge of the last bin, N m, if the samples represent larger torques; by default their largest torque
 
     Examples

@@ -164,7 +164,15 @@ class StoredResults:
 
 def stored_models(context: Context) -> StoredResults:
     """Read the tables and modes that belong to the gearbox file of the folder (fast); note the others as skipped."""
-    return StoredResults(_stored_tables(context), dict(_stored_modes(context)), ())
+    tables = {}
+    for name in dict.fromkeys(mesh.pair.name for mesh in context.gearbox.meshes):
+        if name in context.gearbox.stated_stiffness:
+            continue
+        try:
+            tables[name] = fitting_table(context.gearbox, name, context.folder)
+        except TableError as error:
+            context.notes.left_out.append(f"table of {name}: {error}")
+    return StoredResults(tables, dict(_stored_modes(context)), ())
 
 
 def with_responses(context: Context, models: StoredResults) -> StoredResults:
@@ -236,18 +244,6 @@ def _is_replaced(gearbox: Gearbox, name: str, digest: str) -> bool:
         return file_digest(recording_path(gearbox, name)) != digest
     except (GearboxFileError, FileError):
         return False
-
-
-def _stored_tables(context: Context) -> dict[str, MeshTable]:
-    tables = {}
-    for name in dict.fromkeys(mesh.pair.name for mesh in context.gearbox.meshes):
-        if name in context.gearbox.stated_stiffness:
-            continue
-        try:
-            tables[name] = fitting_table(context.gearbox, name, context.folder)
-        except TableError as error:
-            context.notes.left_out.append(f"table of {name}: {error}")
-    return tables
 
 
 def _stored_modes(context: Context) -> Iterator[tuple[Choice, xr.Dataset]]:

@@ -207,7 +207,6 @@ def multiples_of(data: xr.Dataset, order: float, families: Collection[str]) -> d
     Parameters
     ----------
     order : periods per revolution of the input
-    families : families of meshes of the gearbox
 
     Returns
     -------
@@ -243,7 +242,6 @@ def peaks_of(
     ----------
     data : as `exugear.steady.steady_file.load_response` reads it
     multiples : as `multiples_of` returns them; they are the same with other numbers of teeth
-    families : families of meshes of the gearbox
     frequency : of the resonance, Hz
     inside : lowest and highest speed of the range, rad/s
     """
@@ -310,11 +308,6 @@ def least_favourable(effects: Sequence[Mapping[str, Effect]]) -> dict[str, Effec
 
 def objection_to(effects: Mapping[str, Effect], quantity: str, labels: Mapping[str, str]) -> str:
     """Say why effects speak against a change; empty if they do not.
-
-    Parameters
-    ----------
-    quantity : the one that decides
-    labels : names of the quantities
 
     Examples
     --------

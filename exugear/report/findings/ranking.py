@@ -23,7 +23,7 @@ from exugear.results.spectra.line_spectra import LineSpectra, line_spectra
 from exugear.results.spectra.waterfall import OrderLine
 from exugear.steady.harmonics.branches import standing_peaks
 from exugear.steady.mean_system.signals import Quantity, vector_peak
-from exugear.steady.peaks import SWEEP_SHIFT, line_name
+from exugear.steady.peaks import SWEEP_SHIFT
 from exugear.steady.settings import METHODS
 from exugear.steady.steady_file import complex_amplitudes, response_quantities, settings_of
 from fe_ste.tools.arrays import Booleans, Floats
@@ -262,10 +262,24 @@ def ranking_of(data: xr.Dataset, speeds: tuple[float, float] | None = None, want
             groups.append(group)
             others.append(group)
         group[name] = place, point, line
-    limits = _limits(data, quantities, peaks)
-    lines = _Lines.of(data)
-    found = tuple(_resonance(lines, quantities, sizes, group, limits) for group in groups)
-    return Ranking(found, (low, high), whole, _accelerating_parts(data), quantity=first, reason=reason)
+    ends_of_damping = _limits(data, quantities, peaks)
+    names = data["line"].to_numpy()[1:].tolist()
+    orders = data["order"].to_numpy()[1:].astype(np.float64)
+    found = []
+    for group in groups:
+        _, first_point, line = next(iter(group.values()))
+        amplitudes = {}
+        for quantity in quantities:
+            place, point, _ = group.get(quantity.name, (None, first_point, line))
+            at = sizes[quantity.name][point, line]
+            limits = ends_of_damping.get((point, line, quantity.name))
+            where = quantity.places[int(at.argmax())]
+            amplitudes[quantity.name] = PeakAmplitude(float(at.max()), where, place, limits)
+        order = float(orders[line])
+        at_speed = float(data["speed"][first_point])
+        frequency = order * abs(at_speed) / (2.0 * np.pi)
+        found.append(Resonance(names[line], order, at_speed, frequency, amplitudes))
+    return Ranking(tuple(found), (low, high), whole, _accelerating_parts(data), quantity=first, reason=reason)
 
 
 def resonances(data: xr.Dataset, quantity: str | None = None) -> pd.DataFrame:
@@ -433,41 +447,6 @@ def _is_same_resonance(group: Mapping[str, tuple[int, int, int]], speed: Floats,
     return bool(abs(speed[point] - speed[first]) <= SAME_SPEED_TOLERANCE * speed[first])
 
 
-@dataclass(frozen=True)
-class _Lines:
-    """Names and orders of the lines but 0, and speeds of the points (rad/s), taken from the file once."""
-
-    names: tuple[str, ...]
-    orders: Floats
-    speeds: Floats
-
-    @classmethod
-    def of(cls, data: xr.Dataset) -> _Lines:
-        bases = tuple(str(name) for name in data["base"].to_numpy())
-        names = tuple(line_name(tuple(multiples), bases) for multiples in data["index"].to_numpy()[1:].tolist())
-        return cls(names, data["order"].to_numpy()[1:].astype(np.float64), data["speed"].to_numpy().astype(np.float64))
-
-
-def _resonance(
-    lines: _Lines,
-    quantities: tuple[Quantity, ...],
-    sizes: Mapping[str, Floats],
-    group: Mapping[str, tuple[int, int, int]],
-    limits: Limits,
-) -> Resonance:
-    _, first, line = next(iter(group.values()))
-    amplitudes = {}
-    for quantity in quantities:
-        place, point, _ = group.get(quantity.name, (None, first, line))
-        at = sizes[quantity.name][point, line]
-        amplitudes[quantity.name] = PeakAmplitude(
-            float(at.max()), quantity.places[int(at.argmax())], place, limits.get((point, line, quantity.name))
-        )
-    order = float(lines.orders[line])
-    speed = float(lines.speeds[first])
-    return Resonance(lines.names[line], order, speed, order * abs(speed) / (2.0 * np.pi), amplitudes)
-
-
 def _accelerating_parts(data: xr.Dataset) -> str:
     """Return the parts whose accelerations are given, from the seat data of the file."""
     carried = {bool(carrier) for carrier in json.loads(str(data.attrs["carried_seats"])).values()}
@@ -577,9 +556,7 @@ def most_complete_response(responses: Iterable[xr.Dataset], choice: Choice) -> x
 def most_complete_levels(responses: Iterable[xr.Dataset], choice: Choice) -> ConstantSpeed | None:
     """Return the levels of the response that `most_complete_response` selects."""
     best = most_complete_response(responses, choice)
-    if best is None:
-        return None
-    return constant_speed_of(best)
+    return None if best is None else constant_speed_of(best)
 
 
 def is_over_speed(response: xr.Dataset) -> bool:

@@ -14,7 +14,7 @@ import scipy.linalg
 
 from exugear.gearbox.parts import seat_key
 from exugear.report.pictures.shapes import BodyShape, ModeScene, blank_discs, gear_surface, placed
-from exugear.system.bodies.reduction import BodySurface, ReducedBody
+from exugear.system.bodies.reduction import ReducedBody
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Floats, Integers, Pixels
 from fe_ste.tools.drawing import (
@@ -126,9 +126,6 @@ def draw_gearbox(
 
     Parameters
     ----------
-    bodies : shapes
-    path : file for the picture
-    title : name of the gearbox
     size : width and height of the rendered image, pixels
 
     Raises
@@ -160,8 +157,6 @@ def draw_mode(scene: ModeScene, path: str | Path | None = None, *, size: tuple[i
 
     Parameters
     ----------
-    scene : the mode
-    path : file for the picture
     size : width and height of the rendered image, pixels
 
     Raises
@@ -184,7 +179,6 @@ def animate_mode(
 
     Parameters
     ----------
-    scene : the mode
     path : output file; the suffix must be ``.gif``
     frames : pictures per period
     duration : length of a period, s
@@ -356,7 +350,9 @@ def elastic_scene(assembly: Assembly, shape: Floats, *, title: str = "", amplitu
     for name, coordinates in assembly.elastic_slices.items():
         surface = assembly.elastic_bodies[name].reduced.surface
         if name in fixed and surface.elasticity.any():  # the nodes of matrices hide nothing
-            surface = _half_behind(surface, fixed[name])
+            # only the half behind the axis, seen from `SIDE`
+            behind = (surface.points[surface.quads].mean(axis=1)[:, :2] - fixed[name]) @ SIDE[:2] < 0.0
+            surface = replace(surface, quads=surface.quads[behind], strain=surface.strain[behind])
         motion = shape[coordinates]
         deformed.append((surface, surface.displacement @ motion, surface.energy_density(motion)))
     largest = max(float(np.linalg.norm(moved, axis=1).max()) for _, moved, _ in deformed)
@@ -377,12 +373,6 @@ def elastic_scene(assembly: Assembly, shape: Floats, *, title: str = "", amplitu
         motions=motions,
         title=title,
     )
-
-
-def _half_behind(surface: BodySurface, axis: tuple[float, float]) -> BodySurface:
-    """Return the faces of a surface that lie behind an axis along z, seen from `SIDE`."""
-    behind = (surface.points[surface.quads].mean(axis=1)[:, :2] - axis) @ SIDE[:2] < 0.0
-    return replace(surface, quads=surface.quads[behind], strain=surface.strain[behind])
 
 
 def _areas(points: Floats, quads: Integers) -> Floats:
@@ -423,7 +413,6 @@ def draw_elastic_bodies(
 
     Parameters
     ----------
-    path : file for the picture
     size : width and height of the rendered image, pixels
 
     Raises
@@ -519,7 +508,6 @@ def draw_free_vibration(body: ReducedBody, number: int, path: str | Path | None 
     Parameters
     ----------
     number : 0 for the first elastic mode
-    path : file for the picture
 
     Raises
     ------

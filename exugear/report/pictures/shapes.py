@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 from exugear.gearbox.body_parts import blank_places
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Body, Mesh
-from exugear.gearbox.sections.bodies import ShapeSection
 from exugear.gearbox.units import MM
 from fe_ste.geometry.gears import Gear
 from fe_ste.geometry.profile import tooth_profile
@@ -58,7 +57,6 @@ def gear_surface(gear: Gear, angle: float = 0.0, rim_diameter: float | None = No
 
     Parameters
     ----------
-    gear : the gear
     angle : polar angle of the middle of a tooth at z = 0, rad
     rim_diameter : bore of an external, outside diameter of an internal gear, m; by default the fixed diameter
 
@@ -187,10 +185,6 @@ def bodies_of(gearbox: Gearbox) -> tuple[BodyShape, ...]:
 def tooth_angles(meshes: Sequence[Mesh]) -> dict[tuple[str, str], float]:
     """Rotate the gears of a train so that the teeth of each meet tooth spaces of its mating gears.
 
-    Parameters
-    ----------
-    meshes : all active meshes
-
     Returns
     -------
     dict
@@ -251,25 +245,23 @@ def _shaft(gearbox: Gearbox, body: Body) -> list[TriangleSurface]:
         shape = gearbox.case.bodies[body.family].shape
         if shape is None or body.wheels:
             return []
-        return _pieces(shape, body)
+        # A cone is drawn as the cylinder of its mean diameter.
+        pieces = []
+        start = MM * shape.start_z_mm
+        for piece in shape.sections:
+            end_diameter = piece.outer_diameter_end_mm or piece.outer_diameter_mm
+            end = start + MM * piece.length_mm
+            diameter = 0.5 * MM * (piece.outer_diameter_mm + end_diameter)
+            pieces.append(
+                tube_surface(diameter, start, end, MM * min(piece.inner_diameter_mm, 1e3 * diameter), body.axis)
+            )
+            start = end
+        return pieces
     ends = [z + side * 0.5 * gearbox.gears[name].face_width for name, z in body.wheels.items() for side in (-1.0, 1.0)]
     ends += [bearing.position[2] for bearing in gearbox.bearings if bearing.body == body.name]
     margin = 0.02
     shaft = tube_surface(_shaft_diameter(gearbox, body), min(ends) - margin, max(ends) + margin, centre=body.axis)
     return [shaft]
-
-
-def _pieces(shape: ShapeSection, body: Body) -> list[TriangleSurface]:
-    """Return the pieces of a stepped shaft, a cone as the cylinder of its mean diameter."""
-    pieces = []
-    start = MM * shape.start_z_mm
-    for piece in shape.sections:
-        end_diameter = piece.outer_diameter_end_mm or piece.outer_diameter_mm
-        end = start + MM * piece.length_mm
-        diameter = 0.5 * MM * (piece.outer_diameter_mm + end_diameter)
-        pieces.append(tube_surface(diameter, start, end, MM * min(piece.inner_diameter_mm, 1e3 * diameter), body.axis))
-        start = end
-    return pieces
 
 
 def blank_discs(gearbox: Gearbox, body: Body) -> dict[str, tuple[float, TriangleSurface]]:
@@ -447,7 +439,6 @@ def mode_scene(
 
     Parameters
     ----------
-    bodies : shapes
     motions : by body name, (6,)
         Mode shape in any normalisation, as in `displacement_of`, or complex amplitudes of a vibration in operation;
         bodies that are not listed are at rest.
@@ -482,7 +473,6 @@ def motions_of(bodies: Iterable[Body], coordinates: Mapping[str, Sequence[int]],
 
     Parameters
     ----------
-    bodies : bodies of the model
     coordinates : mapping of body name to six int
         Indices of x, y, z and the rotations about them in the vector; -1 for a missing coordinate.
     shape : (size,) mode shape or displacement

@@ -152,11 +152,8 @@ def strips_of(
 
     Parameters
     ----------
-    curves : by quantity
     titles : title with unit, and factor from SI units, by quantity
     rated : rated speed, rpm
-    size : width and height
-    words : content as text
     """
     fastest = max(float(curve.speed[-1]) for curve in curves.values())
     low, high = ranking.speeds
@@ -285,8 +282,6 @@ def campbell_of(
     frequencies : (n,) of the modes, Hz
     matched : index of the mode by number of the resonance in the ranking, from 1
     rated : rated speed, rpm
-    size : width and height
-    words : content as text
     """
     shown = ranking.resonances[:NUMBERED]
     highest = HEADROOM * max(own.frequency for own in shown)

@@ -123,20 +123,16 @@ def answer_section(material: ReportData) -> Part:
     notes.extend(f"{title}: {answer[name].line}" for title, name in boxes)
     notes.extend(f"{title}: {line}" for title, lines in answer["further"] for line in lines)
     html = render("answer", answer=answer, speed_label=f"{material.input_words} speed / rpm")
-    return Part(html, {"curves": _curves(material, drawn)}, "Answer", "answer")
-
-
-def _curves(material: ReportData, curves: Mapping[str, Envelope]) -> list[dict[str, Any]]:
-    """Return the drawn curves for the readout at the cursor."""
-    return [
+    readout = [
         {
             "label": QUANTITIES[name].short,
             "unit": QUANTITIES[name].unit,
             "speeds": material.arrays.add((curve.speed / RPM).astype("f4")),
             "values": material.arrays.add((QUANTITIES[name].factor * curve.amplitude).astype("f4")),
         }
-        for name, curve in curves.items()
+        for name, curve in drawn.items()
     ]
+    return Part(html, {"curves": readout}, "Answer", "answer")
 
 
 def _scope(material: ReportData, headline: Headline) -> str:

@@ -21,7 +21,6 @@ from exugear.report.findings.words import figure_text
 from exugear.report.pictures.png import png_address
 from exugear.report.sections.material import Part, ReportData, model_name
 from exugear.report.web.html import Cell, Table, render
-from exugear.steady.peaks import line_name
 from exugear.steady.steady_file import complex_amplitudes, response_quantities
 from exugear.system.bearings.duty import BearingLoadState
 from exugear.system.bearings.rolling.rows import BearingError
@@ -58,7 +57,15 @@ def bearings_section(material: ReportData) -> Part:
     duties = list(filter(None, (_duties(material, assembly) for assembly in material.context.assemblies.values())))
     lives = [_rated_variant(material, data) for data in material.ratings.lives]
     data = {} if material.ratings.sheet is None else {"rating": material.ratings.sheet.summary()}
-    _note_damage(material)
+    for life in material.ratings.lives:
+        worst = limits(life)
+        if worst:
+            part, kind, damage = worst[0]
+            size = "infinite" if math.isinf(damage) else f"{damage:.3g}"
+            material.context.notes.statements.append(
+                f"{model_label(choice_of(life.attrs))}: largest fatigue damage in "
+                f"{float(life.attrs['life_years']):g} years: {material.words.labelled(part)}, {size} ({kind})."
+            )
     if not (forces or accelerations or duties or lives):
         return Part(data=data)
     html = render(
@@ -151,7 +158,6 @@ def _accelerations(material: ReportData, data: xr.Dataset) -> dict[str, Any] | N
     kinds = {"acceleration": "bearing", "mount_acceleration": "mount"}
     amplitude = complex_amplitudes(data)[:, 1:]
     orders = data["order"].to_numpy()[1:]
-    bases = tuple(str(name) for name in data["base"].to_numpy())
     found = []
     for quantity in response_quantities(data):
         if quantity.name not in kinds:
@@ -168,12 +174,11 @@ def _accelerations(material: ReportData, data: xr.Dataset) -> dict[str, Any] | N
         if not largest > MIN_RELATIVE_ACCELERATION * found[0][0]:
             break
         speed = abs(float(data["speed"][point]))
-        index = tuple(int(n) for n in data["index"].to_numpy()[line + 1])
         rows.append(
             {
                 "at": f"{kind}: {material.words.of(place)}",
                 "acceleration / (m/s²)": Cell(figure_text(largest), largest),
-                "order": material.words.labelled(line_name(index, bases)),
+                "order": material.words.labelled(str(data["line"][line + 1].item())),
                 "speed / rpm": Cell(figure_text(speed / RPM, 4), speed / RPM),
                 "frequency / Hz": Cell(f"{orders[line] * speed / (2.0 * np.pi):.0f}"),
             }
@@ -263,19 +268,6 @@ def _life(value: float) -> Cell:
 
 LEAST_DAMAGE = 1e-6
 """Damages below this value are shown as "below" it."""
-
-
-def _note_damage(material: ReportData) -> None:
-    """Note the largest damage of each rated variant."""
-    for life in material.ratings.lives:
-        worst = limits(life)
-        if worst:
-            part, kind, damage = worst[0]
-            size = "infinite" if math.isinf(damage) else f"{damage:.3g}"
-            material.context.notes.statements.append(
-                f"{model_label(choice_of(life.attrs))}: largest fatigue damage in "
-                f"{float(life.attrs['life_years']):g} years: {material.words.labelled(part)}, {size} ({kind})."
-            )
 
 
 def _rated_variant(material: ReportData, data: xr.Dataset) -> dict[str, Any]:

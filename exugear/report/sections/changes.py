@@ -36,7 +36,7 @@ from exugear.system.sensitivity import ParameterVariation
 from fe_ste.tools.files import FileError
 
 if TYPE_CHECKING:
-    import xarray as xr
+    pass
 
 CHANGES_NAME = "changes"
 """Identifier of the part."""
@@ -119,15 +119,14 @@ def study_of(study: DesignStudy | None, headline: Headline) -> DesignStudy | Non
 def best_changes(study: DesignStudy, count: int) -> list[tuple[str, str]]:
     """Return what the best recommended changes do to the highest amplitude in the range, and their texts."""
     best = [result for result in study.results if result.recommended][:count]
+    # The table has the details of a change.
     return [
-        (_decibels(result.effects[study.quantity].highest).shown + " dB", _beginning(result.change.words))
+        (
+            _decibels(result.effects[study.quantity].highest).shown + " dB",
+            result.change.words.split(" (")[0].split(",")[0],
+        )
         for result in best
     ]
-
-
-def _beginning(words: str) -> str:
-    """Return the text of a change without its details, which the table has."""
-    return words.split(" (")[0].split(",")[0]
 
 
 def _table(material: ReportData, study: DesignStudy, results: Sequence[ChangeResult], caption: str, name: str) -> Table:
@@ -268,18 +267,6 @@ def _sensitivity(material: ReportData, group: RunGroup) -> dict[str, Any] | None
         f"{material.words.moves(modes, mode)}."
     )
     varied = next((one.variations for one in material.variations if one.choice == own.choice), ())
-    return {
-        "name": group.name,
-        "scope": scope,
-        "table": _sensitivity_table(material, group, modes, mode),
-        "variations": [
-            _variation(material, f"variation-{group.name}-{number}", variation, frequency)
-            for number, variation in enumerate(varied)
-        ],
-    }
-
-
-def _sensitivity_table(material: ReportData, group: RunGroup, modes: xr.Dataset, mode: int) -> Table:
     sensitivities = sensitivities_of(material.words, modes, mode)
     largest = max((abs(sensitivity.shift) for sensitivity in sensitivities), default=1.0)
     kinds = [
@@ -299,7 +286,15 @@ def _sensitivity_table(material: ReportData, group: RunGroup, modes: xr.Dataset,
         for sensitivity in own
     ]
     caption = "First-order frequency shifts of the mode of the first resonance"
-    return Table(rows, ("of",), caption=caption, name=f"levers-{group.name}", sortable=True)
+    return {
+        "name": group.name,
+        "scope": scope,
+        "table": Table(rows, ("of",), caption=caption, name=f"levers-{group.name}", sortable=True),
+        "variations": [
+            _variation(material, f"variation-{group.name}-{number}", variation, frequency)
+            for number, variation in enumerate(varied)
+        ],
+    }
 
 
 def _variation(material: ReportData, name: str, variation: ParameterVariation, frequency: float) -> tuple[Figure, str]:

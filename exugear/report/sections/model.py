@@ -30,7 +30,6 @@ from exugear.report.pictures.png import png_address
 from exugear.report.sections.material import ChartAxis, Curve, Part, ReportData, group_words, model_name
 from exugear.report.web.document import libraries, licences
 from exugear.report.web.html import Cell, Figure, Table, render
-from exugear.results.findings import Finding
 from exugear.results.folder import StoredStudy, stored_studies, times_spent
 from exugear.results.run_file import invalidity_of
 from exugear.results.solver_comparison import EXUDYN_FOLDER, compare_solvers
@@ -89,6 +88,21 @@ def model_section(material: ReportData) -> Part:
     results = material.results
     groups = _compared_groups(material)
     inputs = [{"key": key, "value": value} for key, value in flat_keys(material.context.gearbox.content)]
+    gearbox = material.context.gearbox
+    case = material.context.gearbox.case
+    acceleration = np.linalg.norm(case.gravity.acceleration_m_per_s2)
+    listed = [
+        f"Inertia sets: {', '.join(gearbox.inertia_sets)}; default {case.default_inertias}.",
+        f"Housing stiffness factor of bearings in the housing: {case.housing.factor:g}.",
+        f"Damping: {damping_in_words(case.damping)}.",
+        f"Gravity {'off' if acceleration == 0.0 else f'{acceleration:.2f} m/s²'}.",
+        f"Mesh stiffness at the static load, {static_load_in_words(gearbox)}; meshes are bilateral (they transmit "
+        "tension); the time with tensile mesh force is recorded.",
+        "Modes: linearised at the static load, mesh stiffness averaged over the mesh cycle.",
+        *_elastic_words(material),
+    ]
+    if friction := case.damping.tooth_friction:
+        listed.append(f"Friction of teeth in runs and steady-state responses: coefficient {friction:g}.")
     html = render(
         "model",
         groups=groups,
@@ -97,7 +111,7 @@ def model_section(material: ReportData) -> Part:
         studies=list(map(_study, stored_studies(material.context.folder, material.context.gearbox))),
         notes=material.context.notes,
         missing=material.missing,
-        assumptions=_assumptions(material),
+        assumptions=[*listed, *_deviation_words(material), *_excitation_words(material)],
         source=material.file_words,
         runs=Table(
             [_run_row(material, run) for run in results.runs],
@@ -135,25 +149,6 @@ def model_section(material: ReportData) -> Part:
         licences=licences(),
     )
     return Part(html, title="Model and checks", name="model")
-
-
-def _assumptions(material: ReportData) -> list[str]:
-    gearbox = material.context.gearbox
-    case = material.context.gearbox.case
-    acceleration = np.linalg.norm(case.gravity.acceleration_m_per_s2)
-    listed = [
-        f"Inertia sets: {', '.join(gearbox.inertia_sets)}; default {case.default_inertias}.",
-        f"Housing stiffness factor of bearings in the housing: {case.housing.factor:g}.",
-        f"Damping: {damping_in_words(case.damping)}.",
-        f"Gravity {'off' if acceleration == 0.0 else f'{acceleration:.2f} m/s²'}.",
-        f"Mesh stiffness at the static load, {static_load_in_words(gearbox)}; meshes are bilateral (they transmit "
-        "tension); the time with tensile mesh force is recorded.",
-        "Modes: linearised at the static load, mesh stiffness averaged over the mesh cycle.",
-        *_elastic_words(material),
-    ]
-    if friction := case.damping.tooth_friction:
-        listed.append(f"Friction of teeth in runs and steady-state responses: coefficient {friction:g}.")
-    return [*listed, *_deviation_words(material), *_excitation_words(material)]
 
 
 def _deviation_words(material: ReportData) -> Iterator[str]:
@@ -314,7 +309,8 @@ def _compared_groups(material: ReportData) -> list[dict[str, Any]]:
     content = []
     for group in material.groups:
         facts = facts_of(material.context, material.words, group, material.variations)
-        verdicts = _checks(material, group)
+        found = validity_checks(material.context, group)
+        verdicts = [replace(finding, text=material.words.labelled(finding.text)) for finding in found]
         if group is material.groups[0]:
             notes.findings.extend(verdicts)
             notes.statements.extend(f"{verdict.line}." for verdict in verdicts)
@@ -324,22 +320,26 @@ def _compared_groups(material: ReportData) -> list[dict[str, Any]]:
             notes.statements.extend(f"{several}: {fact.line}" for fact in facts)
             if group is not material.groups[0]:
                 notes.statements.extend(f"{several}: {verdict.line}." for verdict in verdicts)
-        content.append({"name": group.name, "scope": _scope(material, group), "facts": facts, "verdicts": verdicts})
-        _note_comparisons(material, group)
+        content.append(
+            {
+                "name": group.name,
+                "scope": (
+                    f"{group.title[0].upper()}{group.title[1:]}. Load: {_load_of(material, group)}. Speeds: of the "
+                    f"{material.input_words}. Levels: overall transmission error (TE), 0 dB = 1 µm."
+                ),
+                "facts": facts,
+                "verdicts": verdicts,
+            }
+        )
+        for variant, comparison in group.comparisons.items():
+            reference = comparison.second.variant
+            here = _only(group, variant, reference)
+            there = _only(group, reference, variant)
+            material.context.notes.statements.append(
+                f"Resonances in {variant} and not in {reference} ({group.title}): {here}. In {reference} and not in "
+                f"{variant}: {there}."
+            )
     return content
-
-
-def _checks(material: ReportData, group: RunGroup) -> list[Finding]:
-    """Return the checks of a group with the labels of parts."""
-    found = validity_checks(material.context, group)
-    return [replace(finding, text=material.words.labelled(finding.text)) for finding in found]
-
-
-def _scope(material: ReportData, group: RunGroup) -> str:
-    return (
-        f"{group.title[0].upper()}{group.title[1:]}. Load: {_load_of(material, group)}. Speeds: of the "
-        f"{material.input_words}. Levels: overall transmission error (TE), 0 dB = 1 µm."
-    )
 
 
 def _load_of(material: ReportData, group: RunGroup) -> str:
@@ -350,18 +350,6 @@ def _load_of(material: ReportData, group: RunGroup) -> str:
     if loads and not group.responses:
         text = f"{'; '.join(loads)} (tables and steady-state responses: {text})"
     return material.words.labelled(text)
-
-
-def _note_comparisons(material: ReportData, group: RunGroup) -> None:
-    """Note resonances that only one of two variants has; window-dependent ones are not counted."""
-    for variant, comparison in group.comparisons.items():
-        reference = comparison.second.variant
-        here = _only(group, variant, reference)
-        there = _only(group, reference, variant)
-        material.context.notes.statements.append(
-            f"Resonances in {variant} and not in {reference} ({group.title}): {here}. In {reference} and not in "
-            f"{variant}: {there}."
-        )
 
 
 def _only(group: RunGroup, variant: str, other: str) -> str:
@@ -405,13 +393,27 @@ def _target(material: ReportData) -> dict[str, Any] | None:
             _near_row(material, model, data, mode, target) for mode in dict.fromkeys([nearest.index, visible.index])
         ]
         material.context.notes.statements.append(_statement(model, data, nearest, visible, target))
+    found = [
+        ModelMatch(variation.choice, match)
+        for variation in material.variations
+        for match in frequency_matches(variation.variations, target, VISIBLE_SHARE)
+    ]
+    if found:
+        entries = "; ".join(
+            f"{own.assumption} instead of {own.match.parameter.default:g} ({model_label(own.model)}: "
+            f"{own.match.frequency:.0f} Hz)"
+            for own in found
+        )
+        material.context.notes.statements.append(
+            f"Assumptions that shift a mode with TE participation to {target:.0f} Hz: {entries}."
+        )
     return {
         "target": target,
         "near": Table(rows, ("inertia set", "mode shape"), caption=f"Modes near {target:.0f} Hz", name="near"),
         "visible": 100 * VISIBLE_SHARE,
         "within": 100 * NEAR,
         "matches": Table(
-            _matches(material, target),
+            [_match_row(material, own, target) for own in found],
             ("inertia set", "assumption", "mode shape"),
             caption="Assumptions",
             name="matches",
@@ -450,25 +452,6 @@ def _statement(model: Choice, data: xr.Dataset, nearest: ModeReport, visible: Mo
         f"{subject}: no mode within {100 * NEAR:g} % of {target:.0f} Hz; the nearest mode with TE participation is at "
         f"{visible.frequency:.0f} Hz ({visible.name})."
     )
-
-
-def _matches(material: ReportData, target: float) -> list[dict[str, object]]:
-    """Return the rows of the parameter changes that shift a mode to the target."""
-    found = [
-        ModelMatch(variation.choice, match)
-        for variation in material.variations
-        for match in frequency_matches(variation.variations, target, VISIBLE_SHARE)
-    ]
-    if found:
-        entries = "; ".join(
-            f"{own.assumption} instead of {own.match.parameter.default:g} ({model_label(own.model)}: "
-            f"{own.match.frequency:.0f} Hz)"
-            for own in found
-        )
-        material.context.notes.statements.append(
-            f"Assumptions that shift a mode with TE participation to {target:.0f} Hz: {entries}."
-        )
-    return [_match_row(material, own, target) for own in found]
 
 
 def _match_row(material: ReportData, found: ModelMatch, target: float) -> dict[str, object]:

@@ -34,7 +34,7 @@ from exugear.results.spectra.resonances import MAX_SWEEP_RATIO, run_up_cut, swee
 from exugear.results.spectra.run_spectra import WINDOW_FACTORS, AbsenceRule, VariantRun, report_mode
 from exugear.results.spectra.waterfall import OrderLine, order_lines
 from exugear.steady.campbell import Campbell, campbell_from
-from exugear.steady.peaks import Peak, line_name, peaks, planet_sidebands, sidebands
+from exugear.steady.peaks import Peak, peaks, planet_sidebands, sidebands
 from exugear.steady.steady_file import settings_of
 from fe_ste.tools.arrays import Floats
 
@@ -483,15 +483,12 @@ def _order_charts(material: ReportData, data: xr.Dataset, runs: Sequence[Variant
 def _contributions_table(material: ReportData, data: xr.Dataset, name: str) -> Table:
     """Tabulate the contributions to the strongest resonances (method `linear`)."""
     labelled = material.words.labelled
-    bases = tuple(str(name) for name in data["base"].to_numpy())
-    index = data["index"].to_numpy()
     rows = []
     for peak in json.loads(data.attrs["contributions"]):
-        line = peak["line"]
         speed = abs(float(peak["speed"]))
         rows.append(
             {
-                "order": labelled(line_name(tuple(int(n) for n in index[line]), bases)),
+                "order": labelled(str(data["line"][peak["line"]].item())),
                 "speed / rpm": f"{speed / RPM:.2f}",
                 "excited by": labelled(shares(peak["meshes"].items())),
                 "of this, moment of the shuttling load": labelled(shares(peak.get("shuttling", {}).items())) or "–",
@@ -500,14 +497,7 @@ def _contributions_table(material: ReportData, data: xr.Dataset, name: str) -> T
                 "sensitivity to inertia of": labelled(strongest(peak["bodies"])),
             }
         )
-    texts = (
-        "order",
-        "excited by",
-        "of this, moment of the shuttling load",
-        "responding modes",
-        "sensitivity to stiffness of",
-        "sensitivity to inertia of",
-    )
+    texts = [heading for heading in (rows[0] if rows else ()) if heading != "speed / rpm"]
     return Table(rows, texts, caption="Contributions to resonances", name=name)
 
 
@@ -579,8 +569,6 @@ def _mode_rows(
     material: ReportData, diagram: Campbell, data: xr.Dataset, crossings: Sequence[Mapping[str, float]]
 ) -> list[dict[str, object]]:
     """Return the rows of the modes, most excited first."""
-    bases = tuple(str(name) for name in data["base"].to_numpy())
-    index = data["index"].to_numpy()
     strongest: dict[int, Mapping[str, float]] = {}
     for crossing in crossings:
         mode = diagram.mode_at(crossing["speed"], crossing["frequency"])
@@ -599,7 +587,7 @@ def _mode_rows(
             "at highest speed / Hz": f"{fast:.1f}",
             "damping / %": f"{100.0 * diagram.damping[known[-1], mode]:.3f}",
             "type": diagram.kinds[mode],
-            "whirl": _whirl_text(whirl),
+            "whirl": "" if abs(whirl) <= WHIRLING else "forward" if whirl > 0.0 else "backward",
             "strongest crossing": "",
             "fraction / %": "",
             "mode shape": material.words.labelled(diagram.names[mode]),
@@ -608,7 +596,7 @@ def _mode_rows(
             low, high = 100.0 * (diagram.over_angle[mode] - 1.0)
             row["over the carrier's angle / %"] = f"{round(low, 2) + 0.0:.2f} to {high:+.2f}"
         if met is not None:
-            line = line_name(tuple(int(n) for n in index[int(met["line"])]), bases)
+            line = str(data["line"][int(met["line"])].item())
             row["strongest crossing"] = f"{material.words.labelled(line)} at {abs(met['speed']) / RPM:.1f} rpm"
             row["fraction / %"] = f"{100.0 * met['share']:.1f}"
         rows.append(row)
@@ -733,12 +721,6 @@ def _unit_rate(run: VariantRun) -> float:
     return sweep_rate(stored["time"], stored["input_speed"], 1.0)
 
 
-def _whirl_text(whirl: float) -> str:
-    if abs(whirl) <= WHIRLING:
-        return ""
-    return "forward" if whirl > 0.0 else "backward"
-
-
 def _row(material: ReportData, peak: Peak, data: xr.Dataset, rates: dict[str, float]) -> dict[str, object]:
     damping = _damping(peak, data)
     row: dict[str, object] = {
@@ -749,24 +731,21 @@ def _row(material: ReportData, peak: Peak, data: xr.Dataset, rates: dict[str, fl
         "damping / %": "–" if damping is None else f"{100.0 * damping:.3f}",
     }
     for load_case, rate in rates.items():
-        too_fast = damping is not None and sweep_severity(peak.frequency, damping, rate * peak.order) > MAX_SWEEP_RATIO
-        if damping is None:
-            row[f"run-up {load_case}"] = "–"
-        elif too_fast:
-            row[f"run-up {load_case}"] = TOO_FAST
-        else:
-            row[f"run-up {load_case}"] = "slow enough"
+        said = "–"
+        if damping is not None:
+            too_fast = sweep_severity(peak.frequency, damping, rate * peak.order) > MAX_SWEEP_RATIO
+            said = TOO_FAST if too_fast else "slow enough"
+        row[f"run-up {load_case}"] = said
     return row
 
 
 def _damping(peak: Peak, data: xr.Dataset) -> float | None:
     """Return the damping of the mode that the order of a peak crosses there, if known."""
     orders = data["order"].to_numpy()
-    near = []
-    for crossing in json.loads(data.attrs["crossings"]):
-        same = abs(orders[crossing["line"]] - peak.order) < 1e-9 * peak.order
-        if same and abs(crossing["speed"] - peak.speed) < SAME_SPEED * abs(peak.speed):
-            near.append((abs(crossing["speed"] - peak.speed), float(crossing["damping"])))
-    if near:
-        return min(near)[1]
-    return None
+    near = [
+        (abs(crossing["speed"] - peak.speed), float(crossing["damping"]))
+        for crossing in json.loads(data.attrs["crossings"])
+        if abs(orders[crossing["line"]] - peak.order) < 1e-9 * peak.order
+        and abs(crossing["speed"] - peak.speed) < SAME_SPEED * abs(peak.speed)
+    ]
+    return min(near)[1] if near else None

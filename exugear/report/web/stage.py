@@ -59,7 +59,10 @@ def rigid_bodies(gearbox: Gearbox) -> tuple[DrawnBody, ...]:
     """List all bodies of a gearbox that have a shape to draw, as rigid ones."""
     shapes = bodies_of(gearbox)
     colours = body_colours(shapes)
-    return tuple(DrawnBody(shape, _written(colours[shape.family]), shape.name) for shape in shapes)
+    return tuple(
+        DrawnBody(shape, "#" + "".join(f"{round(255 * channel):02x}" for channel in colours[shape.family]), shape.name)
+        for shape in shapes
+    )
 
 
 def _elastic(assembly: Assembly, colours: dict[str, str]) -> list[DrawnBody]:
@@ -84,10 +87,6 @@ def _elastic(assembly: Assembly, colours: dict[str, str]) -> list[DrawnBody]:
             place = np.array([*body.axis, z])
             drawn.append(DrawnBody(BodyShape(seat, seat, disc, place), colour, body.name))
     return drawn
-
-
-def _written(colour: tuple[float, float, float]) -> str:
-    return "#" + "".join(f"{round(255 * channel):02x}" for channel in colour)
 
 
 @dataclass(frozen=True)

@@ -56,8 +56,6 @@ def plot_waterfalls(
     Parameters
     ----------
     runs : title and spectra of each panel
-    lines : order lines to draw and label
-    path : file for the picture
     marks : peaks to circle and number in a panel, such as those that only this run shows
     highest_frequency : end of the frequency axis, Hz
     dynamic_range : span of the colours below the highest level of all runs, dB
@@ -172,7 +170,6 @@ def pooled_levels(
 
     Parameters
     ----------
-    run : spectra
     highest_frequency, fastest : upper ends of the axes, Hz and rad/s; the axes begin at zero
     shape : maximum number of cells along frequency and speed
 

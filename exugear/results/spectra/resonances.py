@@ -49,8 +49,6 @@ def pick_resonances(
 
     Parameters
     ----------
-    spectra : spectra of the run
-    lines : order lines to search
     prominence : minimum height of a peak above the higher of its two adjacent valleys, dB
     depth
         Peaks that are lower than the highest level of all order lines by more than this, dB, are omitted: without
@@ -147,10 +145,6 @@ class WaterfallResonance(ReprMixin, line=" {_frequency_text}, {_highest_text}, {
 
 def group_by_frequency(picks: Iterable[Pick]) -> tuple[WaterfallResonance, ...]:
     """Group the peaks of several orders that belong to one resonance.
-
-    Parameters
-    ----------
-    picks : peaks of any lines
 
     Returns
     -------
@@ -259,7 +253,6 @@ def order_cut(
     ----------
     values, speed : (n,) signal and speed of the reference shaft (rad/s), uniformly sampled
     rate : sampling rate, Hz
-    line : the order to follow
     window_length : s; other orders closer than about ``2 / window_length`` in Hz cause leakage
     overlap : overlap of adjacent windows, in [0, 1)
     window : name of a SciPy window
@@ -311,7 +304,6 @@ def sweep_severity(frequency: float, damping: float, rate: float) -> float:
     Parameters
     ----------
     frequency : frequency of the resonance, Hz
-    damping : damping ratio
     rate : sweep rate, Hz/s
 
     Examples

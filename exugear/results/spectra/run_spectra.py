@@ -289,7 +289,6 @@ def read_run(
     Parameters
     ----------
     path : ``run.nc``, or ``run.partial`` of a run that was stopped
-    lines : order lines to search for resonances
     modes : modes of the same variant, mesh model and inertia set
     window_length : s; runs to be compared need the same length
 
@@ -340,7 +339,6 @@ def only_in_first(picks: Iterable[Pick], other: Waterfall, rule: AbsenceRule | N
 
     Parameters
     ----------
-    picks : peaks of the first run
     other : spectra of the second run, in the same unit
     rule : thresholds; default: those of `AbsenceRule`
 
@@ -469,7 +467,6 @@ def other_windows(
     Parameters
     ----------
     runs : of different variants, analysed with one window length
-    lines : order lines to search
     factors : factors on this window length
     rule : rule by which a peak counts as absent
 

@@ -235,7 +235,6 @@ def waterfall(
     overlap : overlap of adjacent windows, in [0, 1)
     window : name of a SciPy window
     reference : amplitude of 0 dB, in `unit`
-    unit : unit of the signal
 
     Returns
     -------
@@ -287,11 +286,6 @@ def overlapping_frames(values: Floats, length: int, overlap: float) -> Floats:
 
 def line_level(spectra: Waterfall, line: OrderLine) -> Floats:
     """Level along an order line.
-
-    Parameters
-    ----------
-    spectra : spectra of the run
-    line : the order line
 
     Returns
     -------

@@ -509,9 +509,7 @@ def with_results(gearbox: Gearbox, folder: Path, path: str | Path, rules: Rules 
     Parameters
     ----------
     gearbox : imported from the file; its values may have been edited, its names must be unchanged
-    folder : results folder
     path : the REXS file, which is not changed
-    rules : rules of the import
 
     Raises
     ------

@@ -273,7 +273,6 @@ def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules:
     ----------
     source : name of the REXS file, for the comments
     path : intended path of the gearbox file, for messages
-    rules : rules for contradictory values
 
     Raises
     ------
