@@ -295,7 +295,9 @@ def exit_codes() -> Iterator[None]:
     except KeyboardInterrupt:
         end_with("Stopped", "finished results are kept; run the same command to resume", EXIT_INTERRUPTED)
     except OSError as error:
-        end_with("Failed", _file_error_text(error), EXIT_FAILED)
+        # A message of the program itself already names the file.
+        reason = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error)
+        end_with("Failed", reason, EXIT_FAILED)
     except MemoryError as error:
         end_with("Failed", f"out of memory ({error})" if str(error) else "out of memory", EXIT_FAILED)
     except Exception as error:
@@ -306,13 +308,6 @@ def exit_codes() -> Iterator[None]:
             raise
         text = f"{folder}: compiled kernels were damaged and have been removed; run the same command again"
         end_with("Failed", text, EXIT_FAILED)
-
-
-def _file_error_text(error: OSError) -> str:
-    """File and reason of an error; a message of the program itself already names the file."""
-    if error.filename and error.strerror:
-        return f"{error.filename}: {error.strerror}"
-    return str(error)
 
 
 def end_with(what: str, reason: object, code: int) -> NoReturn:

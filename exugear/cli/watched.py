@@ -243,21 +243,17 @@ def open_project(
     variant : by default the usual one of the gearbox
     without : names of excitations that are left out
     """
-    gearbox = _without(read_gearbox(case, allow_dir, scripts), without)
+    gearbox = read_gearbox(case, allow_dir, scripts)
+    for name in without:
+        if name not in gearbox.case.excitations:
+            known = ", ".join(gearbox.case.excitations) or "none in the file"
+            raise BadInputError(f"--without {name}: no such excitation; choose one of: {known}")
+    gearbox = gearbox.varied({f"excitations.{name}.enabled": False for name in without}) if without else gearbox
     choice = Choice(variant or _chosen_variant(gearbox), str(mesh_model), inertias, load_case)
     folder = results_folder(case, out)
     check_choice(gearbox, choice, folder)
     check_results_folder(folder)
     return WatchedProject(gearbox, folder, choice)
-
-
-def _without(gearbox: Gearbox, names: Sequence[str]) -> Gearbox:
-    """Leave out excitations by their names."""
-    for name in names:
-        if name not in gearbox.case.excitations:
-            known = ", ".join(gearbox.case.excitations) or "none in the file"
-            raise BadInputError(f"--without {name}: no such excitation; choose one of: {known}")
-    return gearbox.varied({f"excitations.{name}.enabled": False for name in names}) if names else gearbox
 
 
 def _chosen_variant(gearbox: Gearbox) -> Variant:

@@ -103,21 +103,19 @@ class Channels(ReprMixin):
         second = self._second()
         steps = _Steps(self.path)
         for time, values in self.read(places):
-            steps.check(second * time)
+            instants = second * time
+            steps.check(instants)
             found = values * factors
-            self._check_numbers(found, places, second * time, steps.count - len(time))
-            yield second * time, found
+            bad = np.argwhere(~np.isfinite(found))
+            if bad.size:
+                row, column = bad[0].tolist()
+                raise LoadFileError(
+                    f"{self.path}: channel {self.names[places[column]]} has no number at {instants[row]:g} s (step "
+                    f"{steps.count - len(time) + row + 1}); correct the file"
+                )
+            yield instants, found
         if steps.count < LEAST_LINES:
             raise LoadFileError(f"{self.path}: {steps.count} time steps; at least {LEAST_LINES} are required")
-
-    def _check_numbers(self, values: Floats, places: Sequence[int], time: Floats, before: int) -> None:
-        bad = np.argwhere(~np.isfinite(values))
-        if bad.size:
-            row, column = bad[0].tolist()
-            raise LoadFileError(
-                f"{self.path}: channel {self.names[places[column]]} has no number at {time[row]:g} s (step "
-                f"{before + row + 1}); correct the file"
-            )
 
     def _second(self) -> float:
         unit = unit_of(self.time_unit.strip("() []") or "s", any_case=True)

@@ -479,7 +479,18 @@ def varying_loads(
             return ()
         loads: list[VaryingLoad] = []
         for body in loaded:
-            _check_load_on(origin, key, section, body)
+            if body.fixed:
+                raise origin.error(f"{key}.body = {section.body!r}: a fixed body has no angle; set a rotating body")
+            if section.z_mm is not None and body.spin_only:
+                raise origin.error(
+                    f"{key}.z_mm: {section.body!r} is a spin-only body, which takes torques only; remove z_mm, forces, "
+                    "moments and unbalance, or give the body a position"
+                )
+            halves = [order for order in section.orders if order * section.pole_pairs % 1.0]
+            if halves and body.carrier is not None:
+                raise origin.error(
+                    f"{key}.orders: {halves[0]:g}: half orders of planets are not supported; set whole numbers"
+                )
             loads += _loads_on(origin, name, section, body, static_torque)
         return tuple(replace(load, reaction_on=reaction_on) for load in loads)
 
@@ -501,20 +512,6 @@ def _reaction_of(origin: Origin, key: str, section: ExcitationSection, bodies: M
     if bodies[name].spin_only and (section.force_N or section.moment_N_m):
         raise origin.error(f"{where}: a spin-only body takes torques only; set a body with a position")
     return name
-
-
-def _check_load_on(origin: Origin, key: str, section: ExcitationSection, body: Body) -> None:
-    """Raise an error for a body that cannot have the load of an excitation."""
-    if body.fixed:
-        raise origin.error(f"{key}.body = {section.body!r}: a fixed body has no angle; set a rotating body")
-    if section.z_mm is not None and body.spin_only:
-        raise origin.error(
-            f"{key}.z_mm: {section.body!r} is a spin-only body, which takes torques only; remove z_mm, forces, moments "
-            "and unbalance, or give the body a position"
-        )
-    halves = [order for order in section.orders if order * section.pole_pairs % 1.0]
-    if halves and body.carrier is not None:
-        raise origin.error(f"{key}.orders: {halves[0]:g}: half orders of planets are not supported; set whole numbers")
 
 
 def _loads_on(

@@ -55,8 +55,6 @@ from fe_ste.tools.arrays import Floats
 from fe_ste.tools.stores import Layout, Store
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from fe_ste.root_stress import MeshCycleStress, RootGauges
 
 RZ_OF_RA = 6.0
@@ -460,6 +458,8 @@ def pair_stresses(
     begin : called with the name of each pair before it is computed
     keep : whether to store computed stresses
     """
+    import xarray as xr
+
     from fe_ste.root_stress import MeshCycleStress, mesh_cycle_stress, root_gauges  # finite elements, not for checks
 
     known: dict[tuple[Gear, int], RootGauges] = {}
@@ -485,20 +485,14 @@ def pair_stresses(
             both = gauges(pair.pinion, 1), gauges(pair.gear, -1 if pair.gear.internal else 1)
             kept = mesh_cycle_stress(pair, request.stored.dataset, both)
             if keep:
-                store.write_dataset(_flank_dataset(kept, request.name))
+                variables = {
+                    name: (dims, np.asarray(getattr(kept, name)), {"units": units, "long_name": words})
+                    for name, (dims, units, words) in _FIELDS.items()
+                }
+                coordinates = {
+                    "torque": (("torque",), kept.torque, {"units": "N m"}),
+                    "misalignment": (("misalignment",), kept.misalignment, {"units": "rad"}),
+                }
+                store.write_dataset(xr.Dataset(variables, coordinates, {"pair": request.name, "method_version": LIFE}))
         stresses[request.name] = kept
     return stresses
-
-
-def _flank_dataset(stress: MeshCycleStress, pair: str) -> xr.Dataset:
-    import xarray as xr
-
-    variables = {
-        name: (dims, np.asarray(getattr(stress, name)), {"units": units, "long_name": words})
-        for name, (dims, units, words) in _FIELDS.items()
-    }
-    coordinates = {
-        "torque": (("torque",), stress.torque, {"units": "N m"}),
-        "misalignment": (("misalignment",), stress.misalignment, {"units": "rad"}),
-    }
-    return xr.Dataset(variables, coordinates, {"pair": pair, "method_version": LIFE})

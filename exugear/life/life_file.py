@@ -105,7 +105,7 @@ def to_dataset(life: Life, gearbox: str) -> xr.Dataset:
         values = np.array([getattr(bearing.ratings, name) for bearing in life.bearings], dtype=np.float64)
         variables[f"bearing_{name}_rating"] = (("bearing",), values, {"units": "N"})
     coordinates = {
-        "flank": np.array([flank_label(flank) for flank in life.flanks], dtype=object),
+        "flank": np.array([f"{flank.gear} {flank.flank} {flank.family}" for flank in life.flanks], dtype=object),
         "bearing": np.array([bearing.name for bearing in life.bearings], dtype=object),
         "family": np.array([*life.load_sharing], dtype=object),
     }
@@ -124,11 +124,6 @@ def to_dataset(life: Life, gearbox: str) -> xr.Dataset:
         "method_version": LIFE,
     }
     return xr.Dataset(variables, coordinates, attributes)
-
-
-def flank_label(life: FlankLife) -> str:
-    """Return a label of gear, flank and family of meshes."""
-    return f"{life.gear} {life.flank} {life.family}"
 
 
 def stored_life(path: Path, input_hash: str) -> xr.Dataset | None:

@@ -465,7 +465,12 @@ def stress_requests(
     BalanceError
         No equilibrium under the static load.
     """
-    tilts = _misalignments(assembly)
+    tilts: dict[str, list[float]] = {}
+    if assembly.contacts.contacts:
+        state = static_state(assembly)
+        for contact_place in contact_places(state.assembly, state.q).values():
+            tilts.setdefault(contact_place.table.pair.name, []).append(contact_place.misalignment)
+    tilts = tilts
     reaches = _reaches(assembly, counted)
     found = []
     for request in requests:
@@ -477,16 +482,6 @@ def stress_requests(
             continue
         found.append(_wider(request, tilts[request.name], *reaches.get(request.name, (1.0, 0.0)), folder))
     return found
-
-
-def _misalignments(assembly: Assembly) -> dict[str, list[float]]:
-    """Return the static misalignments of the meshes of each pair in the axes of its table, rad."""
-    tilts: dict[str, list[float]] = {}
-    if assembly.contacts.contacts:
-        state = static_state(assembly)
-        for contact_place in contact_places(state.assembly, state.q).values():
-            tilts.setdefault(contact_place.table.pair.name, []).append(contact_place.misalignment)
-    return tilts
 
 
 def _reaches(assembly: Assembly, counted: CountedLoads) -> dict[str, tuple[float, float]]:

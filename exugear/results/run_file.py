@@ -383,7 +383,16 @@ class RunFile:
 
     def _take(self, piece: Piece) -> None:
         if self._last is None:
-            self._begin(piece)
+            self._raw = self._open.enter_context(replacement(self._path, self._pieces.folder))
+            self._target = ErrorKeeper(self._raw)
+            self._file = self._open.enter_context(h5netcdf.File(self._target, "w"))
+            for dimension, names in piece.names.items():
+                self._file.dimensions[dimension] = len(names) or None
+                made = self._file.create_variable(dimension, (dimension,), TEXT)
+                if names:
+                    made[:] = np.array(names, dtype=object)
+            self._file.dimensions["time"] = self._samples
+            _define(self._file, {name: values for name, values in piece.arrays.items() if _dimension(name) == "time"})
         samples = {name: values for name, values in piece.arrays.items() if _dimension(name) == "time"}
         end = self._written + len(samples["time"])
         for name, values in samples.items():
@@ -392,19 +401,6 @@ class RunFile:
         self._target.check()
         self._lines.append({name: values for name, values in piece.arrays.items() if _dimension(name) in GROWING[1:]})
         self._last, self._written, self._taken = piece, end, self._taken + 1
-
-    def _begin(self, piece: Piece) -> None:
-        """Create the file with the names of a piece and space for all samples."""
-        self._raw = self._open.enter_context(replacement(self._path, self._pieces.folder))
-        self._target = ErrorKeeper(self._raw)
-        self._file = self._open.enter_context(h5netcdf.File(self._target, "w"))
-        for dimension, names in piece.names.items():
-            self._file.dimensions[dimension] = len(names) or None
-            made = self._file.create_variable(dimension, (dimension,), TEXT)
-            if names:
-                made[:] = np.array(names, dtype=object)
-        self._file.dimensions["time"] = self._samples
-        _define(self._file, {name: values for name, values in piece.arrays.items() if _dimension(name) == "time"})
 
 
 class _Unfinished(Exception):

@@ -393,7 +393,15 @@ class Study(ReprMixin):
             design = design_of(file, gearbox) if file.optimise is None else Design({}, {}, ())
             tolerances = tolerances_of(file, gearbox)
             kept = outputs_of(file.outputs, quantities)
-            settings = _settings(file)
+            steady = None
+            if file.steady is not None:
+                section = file.steady
+                check_law(file.choice.mesh_model, section.method)
+                speeds = SpeedRange.from_text(section.speeds)
+                steady = SteadySettings(
+                    speeds, section.method, section.harmonics, section.combinations, section.at_resonances
+                )
+            settings = PointSettings(steady, file.run.duration_s, file.run.solver)
         except (PathError, OutputError, SteadyError, ValueError) as error:
             if isinstance(error, GearboxFileError | StudyError):
                 raise
@@ -482,14 +490,3 @@ def _patterns(content: Any) -> Iterator[str]:
 def _reads_life(outputs: Mapping[str, Output]) -> bool:
     """Return whether load spectra are read."""
     return any(kept.quantity.needs in ("life", "bearings") for kept in outputs.values())
-
-
-def _settings(file: StudyFile) -> PointSettings:
-    """Return the settings for the results of points."""
-    steady = None
-    if file.steady is not None:
-        section = file.steady
-        check_law(file.choice.mesh_model, section.method)
-        speeds = SpeedRange.from_text(section.speeds)
-        steady = SteadySettings(speeds, section.method, section.harmonics, section.combinations, section.at_resonances)
-    return PointSettings(steady, file.run.duration_s, file.run.solver)

@@ -96,11 +96,23 @@ def summarise(gearbox: Gearbox) -> dict[str, Any]:
         "ratio": gearbox.train.ratio,
         "pairs": pairs,
         "tooth_thickness": thickness_summaries(gearbox),
-        "forces": _force_summaries(gearbox),
+        "forces": [
+            {
+                "force": force.name,
+                "body": force.body,
+                "z_mm": 1e3 * force.position[2],
+                "force_N": list(force.wrench[:3]),
+                "moment_N_m": list(force.wrench[3:]),
+            }
+            for force in gearbox.forces
+        ],
         "bearings": bearings,
         "load_cases": loads,
         "variants": variants,
-        "steady": _steady_lacks(assemblies),
+        "steady": {
+            str(variant): str(assembly) if isinstance(assembly, FailedError) else steady_lack(assembly, variant)
+            for variant, assembly in assemblies.items()
+        },
         "matrices": list(external_facts(gearbox)),
         "life": {verb: list(reasons) for verb, reasons in missing_for_life(gearbox).items()},
         "warnings": [*gearbox_warnings(gearbox), *doubts, *_damping_warnings(assemblies)],
@@ -119,14 +131,6 @@ def _assemblies(gearbox: Gearbox, variants: Mapping[str, str]) -> dict[Variant, 
         except FailedError as error:
             found[variant] = error
     return found
-
-
-def _steady_lacks(assemblies: Mapping[Variant, Assembly | FailedError]) -> dict[str, str]:
-    """Return for each variant why it has no steady-state response over speed; empty if it has one."""
-    return {
-        str(variant): str(assembly) if isinstance(assembly, FailedError) else steady_lack(assembly, variant)
-        for variant, assembly in assemblies.items()
-    }
 
 
 def _damping_warnings(assemblies: Mapping[Variant, Assembly | FailedError]) -> list[str]:
@@ -175,20 +179,6 @@ def thickness_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
                 }
             )
     return summaries
-
-
-def _force_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
-    """Summarise the constant forces on bodies."""
-    return [
-        {
-            "force": force.name,
-            "body": force.body,
-            "z_mm": 1e3 * force.position[2],
-            "force_N": list(force.wrench[:3]),
-            "moment_N_m": list(force.wrench[3:]),
-        }
-        for force in gearbox.forces
-    ]
 
 
 def _bearing_summaries(

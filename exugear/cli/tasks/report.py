@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
-from contextlib import AbstractContextManager, nullcontext, suppress
+from contextlib import nullcontext, suppress
 from dataclasses import asdict, dataclass, replace
 from operator import attrgetter
 from pathlib import Path
@@ -78,14 +77,25 @@ def report(
     if other is not None and not other.is_dir():
         raise BadInputError(f"{other}: --compare: no such folder; specify the results folder of another design")
     if other is not None:
-        _check_comparison(folder, other, allow_dir)
+        # Another design that cannot be compared is refused before anything is computed.
+        permissions = Permissions(below=allow_dir)
+        own = read_stored_gearbox(folder, permissions)
+        others = read_stored_gearbox(other, permissions)
+        try:
+            check_ranges(own, others)
+        except ReportError as error:
+            raise BadInputError(error) from error
     if not stored:
         _compute_missing(folder, allow_dir)
     study = None
     if changes.levers:
         study = _design_changes(folder, allow_dir, changes)
     try:
-        with time_noted(folder, "report"), progress_bar() as bar, _parallel_worker() as executor:
+        with (
+            time_noted(folder, "report"),
+            progress_bar() as bar,
+            Workers(1) if available_cores() > 1 else nullcontext() as executor,
+        ):
             task = bar.add_task("report", total=None)
 
             def tell(what: str) -> None:
@@ -110,17 +120,6 @@ def _changed_since(folder: Path) -> list[Finding]:
         return []
     text = f"{source.name} has changed since these results were computed; for the present one: exugear steady {source}"
     return [Finding("warning", text)]
-
-
-def _check_comparison(folder: Path, other: Path, allow_dir: Path | None) -> None:
-    """Refuse another design that cannot be compared, before anything is computed."""
-    permissions = Permissions(below=allow_dir)
-    own = read_stored_gearbox(folder, permissions)
-    others = read_stored_gearbox(other, permissions)
-    try:
-        check_ranges(own, others)
-    except ReportError as error:
-        raise BadInputError(error) from error
 
 
 def _compute_missing(folder: Path, allow_dir: Path | None) -> None:
@@ -202,13 +201,6 @@ def _results_of(folder: Path) -> Path:
         return folder
     note(f"{folder} contains the gearbox file; its results are in {below}")
     return below
-
-
-def _parallel_worker() -> AbstractContextManager[Executor | None]:
-    """Return a second worker process if a core is available for it; the process starts with its first task."""
-    if available_cores() > 1:
-        return Workers(1)
-    return nullcontext()
 
 
 def _outcome(folder: Path, written: Report, study: DesignStudy | None) -> Outcome:

@@ -67,7 +67,10 @@ def tooth_exposures(gearbox: Gearbox, body: str) -> tuple[ToothExposure, ...]:
     [14.1429]
     """
     spins = gearbox.train.rolling_speeds(body, 1.0)
-    forces = gearbox.train.static_mesh_forces(_torque_on(gearbox, body))
+    if body in gearbox.case.static_load.locked:
+        held = ", ".join(gearbox.case.static_load.locked)
+        raise gearbox.error(f"loads.body = {body!r}: static_load.locked locks {held}; set the body at the other end")
+    forces = gearbox.train.static_mesh_forces({body: 1.0})
     exposures: dict[tuple[str, str, str], ToothExposure] = {}
     for mesh in gearbox.meshes:
         for member, holder in enumerate((mesh.pinion, mesh.gear)):
@@ -116,20 +119,6 @@ def bearing_turns(gearbox: Gearbox, body: str) -> dict[str, float]:
     return {
         bearing.name: abs(spins.get(bearing.body, 0.0) - spins.get(bearing.on, 0.0)) for bearing in gearbox.bearings
     }
-
-
-def _torque_on(gearbox: Gearbox, body: str) -> dict[str, float]:
-    """Return a torque of 1 N m on a body, with reactions where the static load has them.
-
-    Raises
-    ------
-    GearboxFileError
-        The body is one of the supports of the static load.
-    """
-    if body in gearbox.case.static_load.locked:
-        held = ", ".join(gearbox.case.static_load.locked)
-        raise gearbox.error(f"loads.body = {body!r}: static_load.locked locks {held}; set the body at the other end")
-    return {body: 1.0}
 
 
 EXPONENTS = (3.0, 10.0 / 3.0, 6.61, 8.74)
@@ -260,28 +249,6 @@ def count_loads(gearbox: Gearbox, progress: Progress | None = None) -> CountedLo
     families: dict[str, float] = {}
     for mesh in gearbox.meshes:
         families[mesh.family] = max(families.get(mesh.family, 0.0), abs(forces[mesh.name]))
-    return CountedLoads(
-        body=loads.body,
-        life_years=loads.life_years,
-        sources=sources,
-        distribution=found,
-        points=points_of(gearbox, sources, found),
-        equivalent_ranges=_equivalent_ranges(sources),
-        teeth=teeth,
-        bearings=bearing_turns(gearbox, loads.body),
-        mesh_forces=families,
-        bin_value=loads.bin_value,
-    )
-
-
-def _weights(source: LoadSource) -> Any:
-    if source.hours.sum() > 0.0:
-        return source.hours
-    return None
-
-
-def _equivalent_ranges(sources: tuple[LoadSource, ...]) -> dict[str, dict[float, float]]:
-    """Return the damage-equivalent range of each component of all fatigue series together, at one cycle per second."""
     series = [source for source in sources if source.series and source.kind == "fatigue" and source.hours.sum() > 0.0]
     hours = np.array([float(history.hours.sum()) for history in series])
     ranges: dict[str, dict[float, float]] = {}
@@ -293,7 +260,24 @@ def _equivalent_ranges(sources: tuple[LoadSource, ...]) -> dict[str, dict[float,
                 )
                 for m in RANGE_EXPONENTS
             }
-    return ranges
+    return CountedLoads(
+        body=loads.body,
+        life_years=loads.life_years,
+        sources=sources,
+        distribution=found,
+        points=points_of(gearbox, sources, found),
+        equivalent_ranges=ranges,
+        teeth=teeth,
+        bearings=bearing_turns(gearbox, loads.body),
+        mesh_forces=families,
+        bin_value=loads.bin_value,
+    )
+
+
+def _weights(source: LoadSource) -> Any:
+    if source.hours.sum() > 0.0:
+        return source.hours
+    return None
 
 
 # Load duration distributions as CSV tables for other programs

@@ -155,45 +155,6 @@ def _plain_values(figures: Mapping[str, float]) -> dict[str, float | str]:
     return programs
 
 
-def rating_sheet(
-    gearbox: Gearbox,
-    rating: RatingSection,
-    counted: CountedLoads,
-    acting: ActingLoads,
-    balance: StaticBalance,
-    finite_elements: Mapping[tuple[str, str, str], Mapping[str, float]],
-    assumptions: tuple[str, ...],
-) -> RatingSheet:
-    """Rate all loaded flanks.
-
-    Parameters
-    ----------
-    counted : of the file, or `exugear.life.rating.sheet.nominal_loads`
-    acting : of these
-    balance : over their torques
-    finite_elements : (gear, family, flank) finite element results
-    """
-    flanks = []
-    scope = {mesh.family: reason for mesh in gearbox.meshes if (reason := outside_scope(mesh.pair))}
-    for tooth in distinct(counted.teeth):
-        if tooth.family in scope:
-            continue
-        for sense in (1, -1):
-            key = tooth.gear, tooth.family, FLANKS[sense * tooth.flank]
-            if np.any(acting.points.torque * sense > 0.0):
-                flank = _flank(gearbox, rating, counted, acting, balance, tooth, sense, finite_elements.get(key, {}))
-                flanks += [] if flank is None else [flank]
-    return RatingSheet(
-        edition=rating.edition,
-        load=_load_in_words(gearbox, counted),
-        flanks=tuple(flanks),
-        shortfalls=tuple(_shortfalls(rating, flanks)),
-        assumptions=(*assumptions, *_assumptions(gearbox, rating)),
-        left_out=(*(f"{family}: not rated, {reason}" for family, reason in scope.items()), *NOT_RATED),
-        other_edition=OTHER_EDITION[rating.edition],
-    )
-
-
 def _flank(
     gearbox: Gearbox,
     rating: RatingSection,
@@ -545,4 +506,24 @@ def rated(
     finite_elements : (gear, family, flank) finite element results, see `exugear.life.rating.sheet`
     remarks : on the finite element results
     """
-    return rating_sheet(gearbox, rating_of(gearbox), counted, acting_loads(counted), balance, finite_elements, remarks)
+    rating = rating_of(gearbox)
+    acting = acting_loads(counted)
+    flanks = []
+    scope = {mesh.family: reason for mesh in gearbox.meshes if (reason := outside_scope(mesh.pair))}
+    for tooth in distinct(counted.teeth):
+        if tooth.family in scope:
+            continue
+        for sense in (1, -1):
+            key = tooth.gear, tooth.family, FLANKS[sense * tooth.flank]
+            if np.any(acting.points.torque * sense > 0.0):
+                flank = _flank(gearbox, rating, counted, acting, balance, tooth, sense, finite_elements.get(key, {}))
+                flanks += [] if flank is None else [flank]
+    return RatingSheet(
+        edition=rating.edition,
+        load=_load_in_words(gearbox, counted),
+        flanks=tuple(flanks),
+        shortfalls=tuple(_shortfalls(rating, flanks)),
+        assumptions=(*remarks, *_assumptions(gearbox, rating)),
+        left_out=(*(f"{family}: not rated, {reason}" for family, reason in scope.items()), *NOT_RATED),
+        other_edition=OTHER_EDITION[rating.edition],
+    )

@@ -270,11 +270,11 @@ def ranking_of(data: xr.Dataset, speeds: tuple[float, float] | None = None, want
         _, first_point, line = next(iter(group.values()))
         amplitudes = {}
         for quantity in quantities:
-            place, point, _ = group.get(quantity.name, (None, first_point, line))
+            rank, point, _ = group.get(quantity.name, (None, first_point, line))
             at = sizes[quantity.name][point, line]
             limits = ends_of_damping.get((point, line, quantity.name))
             where = quantity.places[int(at.argmax())]
-            amplitudes[quantity.name] = PeakAmplitude(float(at.max()), where, place, limits)
+            amplitudes[quantity.name] = PeakAmplitude(float(at.max()), where, rank, limits)
         order = float(orders[line])
         at_speed = float(data["speed"][first_point])
         frequency = order * abs(at_speed) / (2.0 * np.pi)

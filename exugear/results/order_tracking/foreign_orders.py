@@ -174,19 +174,15 @@ def standing_orders(spectrum: OrderSpectrum) -> tuple[OrderInSpectrum, ...]:
     [7.41]
     """
     level = spectrum.prominence
-    peaks = np.flatnonzero((level[2:-2] > ABOVE) & _is_highest(spectrum.amplitude)) + 2
+    # the highest of itself and two neighbours on each side
+    around = np.lib.stride_tricks.sliding_window_view(spectrum.amplitude, 5)
+    peaks = np.flatnonzero((level[2:-2] > ABOVE) & np.asarray(around.argmax(axis=1) == 2)) + 2
     orders = [
         OrderInSpectrum(float(spectrum.order[line]), float(spectrum.amplitude[line]), float(level[line]))
         for line in peaks
         if line > MAIN_LOBE
     ]
     return tuple(sorted(orders, key=lambda order: -order.amplitude))
-
-
-def _is_highest(values: Floats) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Return where a value is the highest of itself and two neighbours on each side, without the two outermost."""
-    around = np.lib.stride_tricks.sliding_window_view(values, 5)
-    return np.asarray(around.argmax(axis=1) == 2)
 
 
 def foreign_orders(

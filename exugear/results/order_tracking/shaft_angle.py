@@ -239,17 +239,13 @@ def _smooth_spline(time: Floats, angle: Floats) -> BSpline:
     for intervals in KNOTS:
         if intervals > time.size // 6:
             break
-        errors[intervals] = _prediction_error(time, angle, intervals)
+        # Root mean square error of left-out pulses, rad
+        predicted = _least_squares(time[::2], angle[::2], intervals)(time[1::2])
+        inside = slice(0, -1) if time.size % 2 == 0 else slice(None)  # a last pulse would be extrapolated
+        errors[intervals] = float(np.sqrt(np.mean((predicted - angle[1::2])[inside] ** 2)))
     least = min(errors.values(), default=np.inf)
     chosen = next((intervals for intervals, error in errors.items() if error <= AS_GOOD * least), 2)
     return _least_squares(time, angle, chosen)
-
-
-def _prediction_error(time: Floats, angle: Floats, intervals: int) -> float:
-    """Root mean square error of left-out pulses, rad."""
-    predicted = _least_squares(time[::2], angle[::2], intervals)(time[1::2])
-    inside = slice(0, -1) if time.size % 2 == 0 else slice(None)  # a last pulse would be extrapolated
-    return float(np.sqrt(np.mean((predicted - angle[1::2])[inside] ** 2)))
 
 
 def _least_squares(time: Floats, angle: Floats, intervals: int) -> BSpline:
