@@ -31,9 +31,7 @@ class Choice:
     models.
     """
     inertias: str | None
-    """Inertia set."""
     load_case: str | None
-    """Load case of a run."""
 
     def __init__(
         self,

@@ -97,7 +97,6 @@ class Gearbox(ReprMixin):
     content: Mapping[str, Any]
     """Raw content of the file before validation."""
     permissions: Permissions = NOTHING_MORE
-    """Permissions of the file."""
 
     @classmethod
     def from_toml(cls, path: str | Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:

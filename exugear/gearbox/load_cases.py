@@ -99,7 +99,6 @@ class LoadSummary(ReprMixin, line=" {name!r}: net torque {net_torque:g} N m, {st
     """Summary of a load case on the kinematic gear train."""
 
     name: str
-    """Name of the load case."""
     inertia: float
     """Inertia of the whole train at the overall input, kg m2."""
     net_torque: float

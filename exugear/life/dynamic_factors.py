@@ -52,7 +52,6 @@ class DynamicFactor(ReprMixin):
     least: float = 1.0
     """Minimum factor."""
     source: str = ""
-    """Source as text."""
 
     def _line(self) -> str:
         return f": {self.value.min():.3f} to {self.value.max():.3f} at {len(self.speed)} speeds"

@@ -200,7 +200,6 @@ class Life(ReprMixin, line=" of {variant}: {flanks!n} flanks, {bearings!n} beari
     reliefs: tuple[str, ...]
     """Pairs with load outside their path of contact, which tip relief would remove."""
     assumptions: tuple[str, ...]
-    """Assumptions of the results."""
     input_hash: str
     """Hash of gearbox file, model settings, tables, load files and versions of methods."""
 

@@ -206,7 +206,6 @@ class StoredLife:
     data: xr.Dataset | None
     """Content; None if it does not belong to the gearbox file."""
     reason: str = ""
-    """Reason in that case."""
 
 
 def stored_lives(gearbox: Gearbox, folder: Path, assembled: Callable[[Choice], Assembly]) -> Iterator[StoredLife]:

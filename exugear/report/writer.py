@@ -119,9 +119,7 @@ class Report:
     """Report that was written."""
 
     path: Path
-    """Path of the page."""
     statements: tuple[str, ...]
-    """Statements of the summary."""
     resonances: tuple[dict[str, Any], ...]
     """Ranking that the page leads with, as `exugear steady` has it in ``--json``; the first is the headline."""
     missing: tuple[str, ...]
@@ -129,7 +127,6 @@ class Report:
     left_out: tuple[str, ...]
     """Skipped files that do not belong to the gearbox file, and results that could not be computed, with the reason."""
     gearbox: Gearbox
-    """Gearbox of the results."""
     headline: Headline | None = None
     """Ranking of the page; None if nothing is ranked."""
     findings: tuple[Finding, ...] = ()

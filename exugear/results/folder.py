@@ -118,7 +118,6 @@ class StepTiming:
     """Run time and memory of a step of the computation."""
 
     step: str
-    """Name of the step."""
     seconds: float
     """Wall-clock time, s."""
     memory: float
@@ -208,7 +207,6 @@ class StoredStudy:
     """A study in a results folder with its combined dataset."""
 
     path: Path
-    """Path of the dataset."""
     title: str
     description: str
     points: int

@@ -219,7 +219,6 @@ class Criteria:
     """Criteria for the points of an optimisation."""
 
     outputs: tuple[str, ...]
-    """Minimised outputs."""
     limits: tuple[tuple[str, Side, float], ...]
     """Output, limited side and limit."""
     percentile: float

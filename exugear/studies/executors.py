@@ -200,9 +200,7 @@ class Task:
     choice: Choice
     settings: PointSettings
     outputs: Mapping[str, Output]
-    """By name."""
     folder: Path
-    """Folder of the study."""
     parameters: Mapping[str, str] = field(default_factory=dict)
     """Names of the parameters that set values in the gearbox file, by path."""
 

@@ -242,7 +242,6 @@ class PointSettings:
     duration: float | None = None
     """Duration of runs, s; by default that of the load case."""
     solver: Solver | None = None
-    """Solver of runs."""
 
 
 @dataclass

@@ -85,7 +85,6 @@ class StudyResult:
     path: Path | None
     """File of the dataset; None for a part if other parts are not finished."""
     dataset: xr.Dataset | None
-    """Content of the dataset."""
 
     @property
     def failed(self) -> list[Record]:

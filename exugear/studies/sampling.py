@@ -291,7 +291,6 @@ class Axis:
 
     dimensions: tuple[str, ...]
     values: Any
-    """Array."""
     units: str = ""
     path: str = ""
     """Paths that it sets, as text."""

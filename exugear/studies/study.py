@@ -331,7 +331,6 @@ class Study(ReprMixin):
     """
 
     file: StudyFile
-    """Content of the study file."""
     source: str
     """Path or name of the study file."""
     gearbox: Gearbox
@@ -339,7 +338,6 @@ class Study(ReprMixin):
     choice: Choice
     settings: PointSettings
     outputs: Mapping[str, Output]
-    """By name."""
     design: Design
     """All points; none for an optimisation."""
     case_digest: str

@@ -106,7 +106,6 @@ class Component:
     type: str
     name: str = ""
     attributes: Mapping[str, Attribute] = field(default_factory=dict)
-    """Attributes by their current names."""
     asked: set[str] = field(default_factory=set, repr=False)
     """Names that have been read so far; the others are reported as omitted by an import."""
 

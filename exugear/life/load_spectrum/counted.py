@@ -130,7 +130,6 @@ class CountedLoads(ReprMixin, line=" on {body!r}: {sources!n} sources, {distribu
     """Counted loads of a gearbox."""
 
     body: str
-    """Loaded body."""
     life_years: float
     sources: tuple[LoadSource, ...]
     distribution: DurationDistribution

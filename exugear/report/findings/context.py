@@ -85,7 +85,6 @@ class ReportNotes:
     """Messages for the top and the end of the page, each list in order of occurrence."""
 
     statements: list[str] = field(default_factory=list)
-    """Statements of the summary."""
     findings: list[Finding] = field(default_factory=list)
     """Checks of the results that the headline is from, and invalid runs."""
     invalid_runs: list[str] = field(default_factory=list)
@@ -99,7 +98,6 @@ class Context:
     """Data that all sections of one report share."""
 
     folder: Path
-    """Results folder."""
     gearbox: Gearbox
     """Gearbox of the gearbox file stored in the folder."""
     target: float | None
@@ -108,7 +106,6 @@ class Context:
     """Callback for progress messages."""
     notes: ReportNotes = field(default_factory=ReportNotes)
     assemblies: dict[Choice, Assembly] = field(default_factory=dict)
-    """Assembled models by model settings."""
     stiffnesses: dict[str, dict[str, Floats | MeshCurve | SteSurface]] = field(default_factory=dict)
     """Mesh stiffness read so far, by mesh model."""
 

@@ -101,7 +101,6 @@ class DesignStudy:
     quantity: str = "error"
     """Quantity that decides, as in `exugear.report.findings.ranking.Ranking`."""
     number: int = 1
-    """Rank of the resonance."""
     loads: Sequence[str] = field(default=("static load",))
     """Loads at which each change is computed."""
     requirements: Sequence[str] = ()

@@ -98,12 +98,10 @@ class SummaryCard:
     """Finding for a card of the page and a line of the command line."""
 
     kind: str
-    """Heading."""
     figure: str
     beside: str
     """Value in large letters, and the text next to it."""
     sentence: str
-    """Further text."""
     link: str
     """Section of the page with details."""
 

@@ -400,7 +400,6 @@ class Channel:
     kind: str
     """{"support", "mesh", "coupling", "body"}"""
     words: str
-    """Label."""
     copies: int
     """Number of equal parts that it represents."""
     mean: float

@@ -242,7 +242,6 @@ class Cause:
     swing: float
     """Amplitude of this harmonic of the static transmission error, and its peak-to-peak value, m."""
     overlap: float
-    """Overlap ratio."""
     share: float | None
     """Fraction of the amplitude that the meshes of this pair cause; None where it is not computed."""
 

@@ -47,7 +47,6 @@ class DesignChange:
     name: str
     """Short name, of letters, digits and hyphens."""
     words: str
-    """What changes, as text."""
     group: str
     """One of `GROUPS`."""
     keys: Mapping[str, Any]

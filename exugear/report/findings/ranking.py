@@ -170,7 +170,6 @@ class Ranking:
     quantity: str = "error"
     """Quantity that decides the order."""
     reason: str = ONLY_QUANTITY
-    """Why it decides, as text."""
 
     @property
     def wanted(self) -> str:

@@ -123,7 +123,6 @@ class Strip:
     top: float
     bottom: float
     path: str
-    """Curve as path data."""
     bands: tuple[tuple[float, float, float], ...]
     """Place, and ends of the range of damping, of each circled peak."""
     ticks: tuple[Mark, ...]
@@ -137,7 +136,6 @@ class Strips:
     frame: Frame
     strips: tuple[Strip, ...]
     words: str
-    """Content as text."""
 
 
 def strips_of(

@@ -35,7 +35,6 @@ class Library:
     name: str
     version: str
     licence: str
-    """Name of its licence."""
     files: tuple[tuple[str, str], ...]
     """Files with the SHA-256 of each."""
     licence_file: str

@@ -37,7 +37,6 @@ class Cell:
     """Table cell with more properties than its text."""
 
     shown: str
-    """Its text."""
     value: float | None = None
     """Number in the unit of the heading, for sorting and for CSV files; NaN where there is none. By default the text
     is used."""

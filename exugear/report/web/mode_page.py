@@ -32,7 +32,6 @@ class ModeRow:
     damping: float
     """Hz, and ratio to critical damping."""
     moves: str
-    """Mode shape as text."""
     strain: str = ""
     """Parts with most strain energy."""
     resonances: str = ""

@@ -209,7 +209,6 @@ class OrderCut(ReprMixin):
     """Amplitude and phase along an order."""
 
     line: OrderLine
-    """The order."""
     time: Floats
     speed: Floats
     frequency: Floats

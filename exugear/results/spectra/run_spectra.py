@@ -54,7 +54,6 @@ class ModeReport(ReprMixin):
     damping_ratio: float
     """Frequency (Hz) and damping ratio."""
     name: str
-    """Description of the mode shape."""
     share: float
     """Participation in the overall transmission error, see `mobility_shares`."""
     amplification: float
@@ -131,7 +130,6 @@ class RunSignals(ReprMixin, line=": {overall.size} samples at {rate:.6g} Hz"):
 
     path: Path
     attributes: Mapping[str, Any]
-    """Attributes of the run."""
     rate: float
     """Sampling rate, Hz."""
     span: float
@@ -225,7 +223,6 @@ class VariantRun(ReprMixin):
 
     path: Path
     attributes: Mapping[str, Any]
-    """Attributes of the run."""
     spectra: Waterfall
     picks: tuple[Pick, ...]
     modes: xr.Dataset | None

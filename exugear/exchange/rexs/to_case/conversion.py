@@ -249,7 +249,6 @@ class Imported(ReprMixin, line=" {gearbox!r}: {changed!n} assumptions, {ignored!
     text: str
     """Text of the gearbox file with its comments."""
     gearbox: Gearbox
-    """Gearbox of this file."""
     changed: tuple[str, ...]
     """Values that were replaced, and important assumptions."""
     ignored: tuple[str, ...]

@@ -81,7 +81,6 @@ class ImportedLoads:
     """Torques (N m) and speeds (rpm) on bodies, positive about +z."""
 
     name: str
-    """Name of the load case."""
     description: str
     torques: Mapping[str, float]
     speeds: Mapping[str, float]
