@@ -358,11 +358,6 @@ def contact_pressure(results: PointResults, *, pair: str) -> float:
     return float(largest_contact_stress(results.gearbox.pairs[pair].pair, table.static_state))
 
 
-def ripples(ste: Floats) -> Floats:
-    """Return the peak-to-peak values of a transmission error over positions (the first axis)."""
-    return np.asarray(np.ptp(ste, axis=0), dtype=np.float64)
-
-
 def worst_ripple(
     results: PointResults,
     *,
@@ -373,7 +368,7 @@ def worst_ripple(
 ) -> float:
     """Largest peak-to-peak static transmission error over loads and misalignments."""
     data = results.states(pair, positions, torque_factors, misalignment_um)
-    return float(ripples(data["ste"].to_numpy()).max())
+    return float(np.ptp(data["ste"].to_numpy(), axis=0).max())
 
 
 def mean_ripple(
@@ -386,7 +381,7 @@ def mean_ripple(
 ) -> float:
     """Mean peak-to-peak static transmission error over loads and misalignments."""
     data = results.states(pair, positions, torque_factors, misalignment_um)
-    return float(ripples(data["ste"].to_numpy()).mean())
+    return float(np.ptp(data["ste"].to_numpy(), axis=0).mean())
 
 
 def worst_pressure(
@@ -415,22 +410,22 @@ Worst = Callable[[Iterable[float]], float]
 
 def contact_safeties(results: PointResults, *, of: str = "life") -> dict[str, float]:
     """Safety factor S_H (pitting) by gear, flank and meshes; for planets the worst."""
-    return _flank_values(results, SAFETIES[of].format("contact"))
+    return _values_of(results, "flank", SAFETIES[of].format("contact"))
 
 
 def root_safeties(results: PointResults, *, of: str = "life") -> dict[str, float]:
     """Safety factor S_F (tooth root breakage) by gear, flank and meshes; for planets the worst."""
-    return _flank_values(results, SAFETIES[of].format("root"))
+    return _values_of(results, "flank", SAFETIES[of].format("root"))
 
 
 def contact_damages(results: PointResults) -> dict[str, float]:
     """Pitting damage (Miner's sum) by gear, flank and meshes; for planets the worst."""
-    return _flank_values(results, "contact_damage")
+    return _values_of(results, "flank", "contact_damage")
 
 
 def root_damages(results: PointResults) -> dict[str, float]:
     """Tooth root damage (Miner's sum) by gear, flank and meshes; for planets the worst."""
-    return _flank_values(results, "root_damage")
+    return _values_of(results, "flank", "root_damage")
 
 
 def worst_planets(results: PointResults) -> dict[str, float]:
@@ -472,10 +467,7 @@ def bearing_damages(results: PointResults, *, by: str = MINIMUM) -> dict[str, fl
 
 def static_safeties(results: PointResults) -> dict[str, float]:
     """Safety factor S_0 (static) of bearings under the largest load."""
-    data = results.life
-    return dict(
-        zip(map(str, data["bearing"].to_numpy()), map(float, data["bearing_static_safety"].to_numpy()), strict=True)
-    )
+    return _values_of(results, "bearing", "static_safety")
 
 
 def bearing_life(results: PointResults, *, bearing: str = "", by: str = MINIMUM) -> float:
@@ -509,9 +501,9 @@ def shortfalls(results: PointResults) -> float:
     return float(sum(len(json.loads(results.life.attrs[key])) for key in ("failures", "shortfalls")))
 
 
-def _flank_values(results: PointResults, key: str) -> dict[str, float]:
+def _values_of(results: PointResults, kind: Literal["flank", "bearing"], key: str) -> dict[str, float]:
     data = results.life
-    return dict(zip(map(str, data["flank"].to_numpy()), map(float, data[f"flank_{key}"].to_numpy()), strict=True))
+    return dict(zip(map(str, data[kind].to_numpy()), map(float, data[f"{kind}_{key}"].to_numpy()), strict=True))
 
 
 def _bearing_values(results: PointResults, key: str, by: str, worst: Worst) -> dict[str, float]:

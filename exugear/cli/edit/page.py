@@ -7,7 +7,7 @@ from typing import Any
 
 from exugear.cli.edit.places import schema_for_completion
 from exugear.cli.edit.work import KINDS
-from exugear.report.web.document import STYLES, ArrayStore, whole_page
+from exugear.report.web.document import NO_RESULTS, STYLES, ArrayStore, whole_page
 from exugear.report.web.html import render
 
 LIBRARIES = ("codemirror.min.js", "three.min.js", "uPlot.iife.min.js")
@@ -22,11 +22,7 @@ def edit_page(case: Path, nonce: str) -> bytes:
     """
     data: dict[str, Any] = {
         "name": case.name,
-        "input": "",
-        "rated": None,
-        "lines": [],
-        "groups": [],
-        "charts": {},
+        **NO_RESULTS,
         "models": {},
         "nonce": nonce,
         "schema": schema_for_completion(),

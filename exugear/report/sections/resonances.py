@@ -22,7 +22,7 @@ from exugear.report.findings.headline import Headline
 from exugear.report.findings.ranking import HOUSING, SHAFTS, Ranking, Resonance, is_over_speed
 from exugear.report.findings.resonance_list import ListedResonance
 from exugear.report.findings.words import QUANTITIES, figure_text, percentages, rounded_text
-from exugear.report.pictures.speed_diagrams import NUMBERED, CampbellDrawing, campbell_of
+from exugear.report.pictures.speed_diagrams import NUMBERED, campbell_of
 from exugear.report.sections.material import ChartAxis, Curve, Part, ReportData, model_name
 from exugear.report.sections.measured import measured_run_ups
 from exugear.report.sections.run_data import is_found_always
@@ -118,13 +118,11 @@ def _of_group(material: ReportData, group: RunGroup, variant: str) -> dict[str, 
         "group": group.name,
         "variant": variant,
         "title": title,
-        "range": range_text(ranking),
-        "whole": ranking.whole,
         "count": f"{inside}" if inside >= total else f"first {inside} of {total}",
         "table": replace(table, choices=[f"{prefix}{number}" for number in range(len(listed))]),
         "choice": prefix,
         "note": _list_note(material, ranking, bool(group.responses)),
-        "campbell": _campbells(material, ranking, listed, group.runs[variant].modes),
+        **_drawn(material, ranking, listed, group.runs[variant].modes),
     }
 
 
@@ -139,18 +137,15 @@ def _of_estimate(material: ReportData, headline: Headline) -> dict[str, Any]:
         listed.append(
             ListedResonance(OrderLine(own.line, own.order), abs(own.speed), own.frequency, level, True, mode, own)
         )
-    rows = _response_rows(material, ranking, listed)
     return {
         "group": None,
         "variant": None,
         "title": f"{Variant.of(headline.choice.variant).label.capitalize()}, {headline.source}",
-        "range": range_text(ranking),
-        "whole": ranking.whole,
         "count": f"{len(listed)}",
-        "table": _table(rows, listed, "Resonances", "resonances"),
+        "table": _table(_response_rows(material, ranking, listed), listed, "Resonances", "resonances"),
         "choice": "",
         "note": "Zero-to-peak amplitudes of single orders. " + note_of(material, headline),
-        "campbell": _campbells(material, ranking, listed, headline.modes),
+        **_drawn(material, ranking, listed, headline.modes),
     }
 
 
@@ -159,12 +154,6 @@ def _table(rows: list[dict[str, object]], listed: Sequence[ListedResonance], cap
     texts = ("excited by", "place", "mode shape", "strain energy")
     hidden = ("from rated / %", "place", "mode", "prominence / dB", "± µm", "strain energy")
     return Table(rows, texts, caption=caption, name=name, sortable=True, stacked=True, hidden=hidden, kinds=kinds)
-
-
-def range_text(ranking: Ranking) -> str:
-    """Return the evaluated speeds as text."""
-    low, high = (rounded_text(speed / RPM) for speed in ranking.speeds)
-    return f"{low} to {high} rpm"
 
 
 def note_of(material: ReportData, headline: Headline) -> str:
@@ -317,13 +306,15 @@ def _number(value: int | None) -> Cell:
     return Cell(str(value), value)
 
 
-def _campbells(
+def _drawn(
     material: ReportData, ranking: Ranking, listed: Sequence[ListedResonance], modes: xr.Dataset | None
-) -> list[CampbellDrawing]:
-    """Draw orders and modes with the first resonances of a list, for windows of desktops and phones."""
+) -> dict[str, Any]:
+    """Return the speeds of a list, and orders and modes with its first resonances, for desktops and phones."""
+    low, high = (rounded_text(speed / RPM) for speed in ranking.speeds)
+    evaluated = {"range": f"{low} to {high} rpm", "whole": ranking.whole}
     inside = [own for own in listed if own.inside][:SHOWN]
     if not inside:
-        return []
+        return {**evaluated, "campbell": []}
     drawn = tuple(Resonance(own.line.name, own.line.order, own.speed, own.frequency, {}) for own in inside)
     matched = {number: own.mode for number, own in enumerate(inside, start=1) if own.mode is not None}
     frequencies = np.zeros(0) if modes is None else modes["frequency"].to_numpy()
@@ -335,7 +326,8 @@ def _campbells(
     words = "Orders are lines through the origin, modes are horizontal lines; circles have the numbers of the list."
     shown = replace(ranking, resonances=drawn)
     known = matched if modes is not None else {}
-    return [campbell_of(shown, lines, frequencies, known, rated, size, words) for size in CAMPBELL]
+    drawings = [campbell_of(shown, lines, frequencies, known, rated, size, words) for size in CAMPBELL]
+    return {**evaluated, "campbell": drawings}
 
 
 # All modes of each model

@@ -226,6 +226,10 @@ THEME = (
 """Script that runs before the first paint: it sets the colours selected last, or those of the system."""
 
 
+NO_RESULTS: Mapping[str, Any] = {"input": "", "rated": None, "lines": [], "groups": [], "charts": {}}
+"""Data of a page without results over speed."""
+
+
 def whole_page(
     title: str,
     body: Markup,
