@@ -295,7 +295,6 @@ _TYPES = {
 
 
 def _remedy(error: Any) -> str:
-    """Return the remedy of an error."""
     if error["type"] == "extra_forbidden":
         if hint := renamed_hint([str(part) for part in error["loc"]], GEARBOX_RENAMES):
             return hint

@@ -244,7 +244,6 @@ def _solve_angle(
 def _static_coordinates(
     assembly: Assembly, body: str, torque: float, about: Floats, wrench: Floats | None, near: Floats | None
 ) -> Floats:
-    """Return the static coordinates, (size,)."""
     locked = assembly.gearbox.locked
     try:
         return locked_equilibrium(assembly, {body: torque}, locked, assembly.mean_meshes, about, wrench, near)

@@ -86,7 +86,6 @@ def command_line(gearbox: Gearbox, folder: Path, verb: str, model: Choice) -> st
 
 
 def _scope(material: ReportData) -> str:
-    """Describe the gearbox and the results below the name of the page."""
     gearbox = material.context.gearbox
     rated = gearbox.case.operation.rated_speed_rpm
     parts = [] if rated is None else [f"rated {rated:g} rpm"]

@@ -408,7 +408,6 @@ class _Unfinished(Exception):
 
 
 def _dimension(name: str) -> str:
-    """First dimension of a variable."""
     return VARIABLES[name].dimensions[0]
 
 

@@ -286,7 +286,6 @@ def _built(task: Task, work: PointInput) -> Gearbox:
 
 
 def _journal_form(values: Values) -> Any:
-    """Return values in the form used in a journal."""
     if isinstance(values, Mapping):
         return {name: json_number(float(value)) for name, value in values.items()}
     return json_number(float(values))

@@ -92,7 +92,6 @@ _TYPES: dict[str, tuple[type, ...]] = {"float": (int, float), "int": (int,), "st
 
 
 def _fits(value: object, kind: str) -> bool:
-    """Return whether a value has the type of an annotation."""
     if kind == "Sequence[float]":
         return isinstance(value, list) and bool(value) and all(_fits(entry, "float") for entry in value)
     return isinstance(value, _TYPES[kind]) and (kind == "bool" or not isinstance(value, bool))
@@ -284,7 +283,6 @@ def nearest_names(name: str, known: Sequence[str]) -> str:
 
 
 def _amplitudes(results: PointResults, signal: str) -> Floats:
-    """Return the amplitudes (points, lines) of a signal."""
     names = [str(name) for name in results.steady["signal"].to_numpy()]
     found = named_amplitudes(names, complex_amplitudes(results.steady), signal)
     if found is None:

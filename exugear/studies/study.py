@@ -465,7 +465,6 @@ def _guarded(key: str, check: Any, *arguments: Any) -> None:
 
 
 def _texts(content: Any) -> Iterator[str]:
-    """Yield all texts in a content."""
     if isinstance(content, str):
         yield content
     elif isinstance(content, Mapping):

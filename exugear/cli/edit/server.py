@@ -215,7 +215,6 @@ class Handler(BaseHTTPRequestHandler):
             raise RefusedError(HTTPStatus.NOT_FOUND, "no such page")
 
     def _start(self, kind: str) -> None:
-        """Start a long computation of the saved file."""
         server = self.server
         text = server.file.text()
         gearbox = server.analyst.check(text).gearbox
@@ -224,7 +223,6 @@ class Handler(BaseHTTPRequestHandler):
         server.work.start(kind, digest_of(text))
 
     def _content(self) -> dict[str, Any]:
-        """Read the JSON object of a request."""
         if self.headers.get_content_type() != "application/json":  # a form of another page cannot send it
             raise RefusedError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "content must be JSON")
         length = self.headers.get("Content-Length", "")

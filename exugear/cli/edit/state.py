@@ -253,7 +253,6 @@ def kinematics(gearbox: Gearbox) -> dict[str, Any]:
 
 
 def _family(gearbox: Gearbox, name: str) -> str:
-    """Return the section of a body."""
     body = gearbox.named_bodies.get(name)
     return name if body is None else body.family
 

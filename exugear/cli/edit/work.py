@@ -140,7 +140,6 @@ class LongWork:
 
 
 def _begun(arguments: list[str]) -> subprocess.Popen[str]:
-    """Start a command of this program."""
     program = "from exugear.cli.app import main; main()"
     return subprocess.Popen(
         # -P: modules in the current folder, which may be a stranger's, are not imported.
@@ -177,7 +176,6 @@ def _follow(task: LongTask, others: list[list[str]]) -> None:
 
 
 def _interrupt(process: subprocess.Popen[str]) -> None:
-    """Ask a command to stop."""
     if sys.platform == "win32":
         process.terminate()
     else:

@@ -238,7 +238,6 @@ def write_together(folder: Path, contents: Mapping[str, bytes]) -> None:
 
 
 def _refuse_existing(folder: Path, names: Iterable[str]) -> None:
-    """Refuse to replace files."""
     if existing := next((folder / name for name in names if (folder / name).exists()), None):
         raise BadInputError(f"{existing}: exists already; specify another folder with --to")
 

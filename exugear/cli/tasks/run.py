@@ -87,7 +87,6 @@ def run(
 
 
 def _compare(project: Project, duration: float, kept: Mapping[str, float]) -> SolverComparison:
-    """Integrate the beginning of the run with Exudyn."""
     try:
         return project.compare_with_exudyn(duration, **kept)
     except (RunError, LimitError, FileError) as error:

@@ -137,7 +137,6 @@ def read_study(path: Path, allow_dir: Path | None, scripts: bool) -> Study:
 
 
 def _run(study: Study, folder: Path, opens: Opens, shard: Shard, merge: bool, retry: bool) -> StudyResult:
-    """Run the study with a progress bar."""
     with progress_bar() as bar:
         task = bar.add_task("points", total=None)
         first: list[int] = []
@@ -155,7 +154,6 @@ def _run(study: Study, folder: Path, opens: Opens, shard: Shard, merge: bool, re
 
 
 def _draw(study: Study, folder: Path, swept: StudyResult) -> list[Path]:
-    """Plot the combined results."""
     if swept.dataset is None:
         return []
     search = study.file.optimise

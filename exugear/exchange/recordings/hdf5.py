@@ -150,7 +150,6 @@ def _time(path: Path, name: str, data: h5py.Dataset, times: dict[str, h5py.Datas
 
 
 def _values(data: h5py.Dataset) -> Floats:
-    """Values of a dataset, unpacked."""
     return floats(data[:]) * _factor(data, "scale_factor", 1.0) + _factor(data, "add_offset", 0.0)
 
 

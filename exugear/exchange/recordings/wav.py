@@ -102,7 +102,6 @@ def _checked_header(path: Path, file: IO[bytes]) -> tuple[int, float]:
 
 
 def _chunks(path: Path, file: IO[bytes], size: int) -> Iterator[tuple[bytes, int, int]]:
-    """Yield name, position and length of each chunk."""
     head = file.read(12)
     if len(head) < 12 or head[:4] != b"RIFF" or head[8:] != b"WAVE":
         raise RecordingError(f"{path}: does not begin as a WAV file (RIFF, WAVE); check the extension")

@@ -281,12 +281,6 @@ def rainflow(series: Floats) -> tuple[Floats, Floats, Floats]:
     return count.cycles()
 
 
-def damage_equivalent_range(series: Floats, exponent: float, cycles: float) -> float:
-    """Return the range of `cycles` equal cycles with the damage of a series: see `equivalent_range`."""
-    ranges, _, counts = rainflow(series)
-    return equivalent_range(ranges, counts, exponent, cycles)
-
-
 def equivalent_range(ranges: Floats, counts: Floats, exponent: float, cycles: float) -> float:
     """Return the range of `cycles` equal cycles with the same damage, by Miner's rule with one slope, without means.
 

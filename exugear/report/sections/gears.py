@@ -225,7 +225,6 @@ def _pair(material: ReportData, own: PairContact, ripple: PairExcitation | None)
 
 
 def _data_sheet(own: PairContact, ripple: PairExcitation | None) -> Table:
-    """List the geometry and the excitation of a pair."""
     gears = (own.pair.pinion, own.pair.gear)
 
     def both(values: Iterable[float], digits: str) -> str:

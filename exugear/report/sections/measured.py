@@ -75,9 +75,9 @@ def _row(material: ReportData, peak: dict[str, Any]) -> dict[str, object]:
     """Return a row of the table of peaks; a side without the peak has no speed."""
     unit, factor = DRAWN_UNITS[peak["unit"]]
 
-    def number(key: str, form: str, scale: float = 1.0) -> Cell:
+    def number(key: str, form: str) -> Cell:
         value = peak[key]
-        return Cell("none", float("nan")) if value is None else Cell(format(scale * value, form), scale * value)
+        return Cell("none", float("nan")) if value is None else Cell(format(value, form), value)
 
     return {
         "order": material.words.labelled(peak["order"]),

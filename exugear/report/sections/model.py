@@ -152,7 +152,6 @@ def model_section(material: ReportData) -> Part:
 
 
 def _deviation_words(material: ReportData) -> Iterator[str]:
-    """List the gears with deviations."""
     gears = []
     for (body, gear), deviation in material.context.gearbox.deviations.items():
         pitch = float(np.ptp(deviation.pitch)) if deviation.pitch.size else 0.0

@@ -175,7 +175,6 @@ def _ranked_by(material: ReportData, ranking: Ranking) -> str:
 
 
 def _list_note(material: ReportData, ranking: Ranking, at_constant: bool) -> str:
-    """Say what the amplitudes of a list are of."""
     if not at_constant:
         return "Levels of the overall transmission error in the run-up, dB re 1 µm."
     text = "Zero-to-peak amplitudes of single orders"
@@ -203,7 +202,6 @@ def _response_rows(
     group: RunGroup | None = None,
     variant: str = "",
 ) -> list[dict[str, object]]:
-    """Return the rows of resonances with all quantities and their ranks."""
     largest: dict[str, float] = {}
     for own in (own for own in listed if own.inside):
         for name, amplitude in (own.resonance.amplitudes if own.resonance else {}).items():
@@ -234,7 +232,6 @@ def _response_rows(
 def _run_rows(
     material: ReportData, group: RunGroup, variant: str, listed: Sequence[ListedResonance]
 ) -> list[dict[str, object]]:
-    """Return the rows of resonances of a run-up, with their checks."""
     if group.responses:
         return []
     rows = []
@@ -359,7 +356,6 @@ def _all_modes(material: ReportData, model: Choice, data: xr.Dataset) -> Table:
 
 
 def _note_growth(material: ReportData) -> None:
-    """Note models with growing disturbances."""
     for model, data in material.results.modes.items():
         growth = float(data.attrs["growth_rate"])
         if growth > 0.0:
@@ -473,7 +469,6 @@ def _order_charts(material: ReportData, data: xr.Dataset, runs: Sequence[Variant
 
 
 def _contributions_table(material: ReportData, data: xr.Dataset, name: str) -> Table:
-    """Tabulate the contributions to the strongest resonances (method `linear`)."""
     labelled = material.words.labelled
     rows = []
     for peak in json.loads(data.attrs["contributions"]):

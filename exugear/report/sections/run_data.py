@@ -270,7 +270,6 @@ def axial_of_shaft(gearbox: Gearbox, channel: Channel) -> float:
 
 
 def _loudest(material: ReportData, channel: Channel) -> dict[str, Any] | None:
-    """Return the values of a bearing for its table."""
     order = dominant_order(channel.spectra, material.lines)
     return {
         "words": channel.words,

@@ -233,6 +233,10 @@ class OrderCut(ReprMixin):
         }
 
 
+OVERLAP = 0.75
+"""Overlap of the windows of an order cut, as a fraction."""
+
+
 def order_cut(
     values: ArrayLike,
     speed: ArrayLike,
@@ -240,21 +244,17 @@ def order_cut(
     line: OrderLine,
     *,
     window_length: float,
-    overlap: float = 0.75,
-    window: str = "hann",
 ) -> OrderCut:
     """Follow an order along the instantaneous speed.
 
-    The signal is multiplied by ``exp(-i order angle)``, the angle being the integral of the speed, and averaged under a
-    window. This demodulates the order to zero frequency, so that its amplitude is exact at any sweep rate.
+    The signal is multiplied by ``exp(-i order angle)``, the angle being the integral of the speed, and averaged under
+    Hann windows. This demodulates the order to zero frequency, so that its amplitude is exact at any sweep rate.
 
     Parameters
     ----------
     values, speed : (n,) signal and speed of the reference shaft (rad/s), uniformly sampled
     rate : sampling rate, Hz
     window_length : s; other orders closer than about ``2 / window_length`` in Hz cause leakage
-    overlap : overlap of adjacent windows, in [0, 1)
-    window : name of a SciPy window
 
     Examples
     --------
@@ -273,17 +273,17 @@ def order_cut(
     step = 0.5 * (np.abs(shaft[1:]) + np.abs(shaft[:-1])) / rate
     angle = np.concatenate([[0.0], np.cumsum(step)])
     turning_back = np.exp(-1j * line.order * angle)
-    weights = scipy.signal.get_window(window, length)
+    weights = scipy.signal.get_window("hann", length)
     weights *= 2.0 / weights.sum()
     demodulated = signal * turning_back
-    mean_speed = np.abs(overlapping_frames(shaft, length, overlap).mean(axis=1))
+    mean_speed = np.abs(overlapping_frames(shaft, length, OVERLAP).mean(axis=1))
     return OrderCut(
         line=line,
-        time=overlapping_frames(np.arange(signal.size) / rate, length, overlap).mean(axis=1),
+        time=overlapping_frames(np.arange(signal.size) / rate, length, OVERLAP).mean(axis=1),
         speed=mean_speed,
         frequency=line.frequency(mean_speed),
-        amplitude=overlapping_frames(demodulated.real, length, overlap) @ weights
-        + 1j * (overlapping_frames(demodulated.imag, length, overlap) @ weights),
+        amplitude=overlapping_frames(demodulated.real, length, OVERLAP) @ weights
+        + 1j * (overlapping_frames(demodulated.imag, length, OVERLAP) @ weights),
     )
 
 

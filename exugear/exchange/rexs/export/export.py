@@ -553,7 +553,6 @@ def _static_load_case(gearbox: Gearbox, model: Model) -> int | None:
 
 
 def _replaced(results: Results) -> tuple[str, ...]:
-    """Results in the file that are replaced."""
     entries = []
     for addition in results.additions:
         part = results.model.components[addition.component]

@@ -59,7 +59,7 @@ def teeth_of(model: Model, places: ComponentPositions, bodies: RigidGroups, note
     RexsError
         Stages cannot be converted to gear pairs; all reasons are reported.
     """
-    first = first_of_planets(model, places, bodies)
+    first = first_of_planets(places, bodies)
     met: dict[frozenset[int], tuple[Component, list[Component]]] = {}
     for relation in model.relations_of("stage"):
         with notes.errors.gathered():
@@ -104,7 +104,7 @@ def teeth_of(model: Model, places: ComponentPositions, bodies: RigidGroups, note
     )
 
 
-def first_of_planets(model: Model, places: ComponentPositions, bodies: RigidGroups) -> dict[int, int]:
+def first_of_planets(places: ComponentPositions, bodies: RigidGroups) -> dict[int, int]:
     """Map the gear of each planet to the equal gear of the first planet, by their numbers."""
 
     def ordered(parts: Iterable[Component]) -> list[int]:

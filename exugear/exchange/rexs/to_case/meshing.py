@@ -200,7 +200,6 @@ def _zeros_with_followers(
 
 
 def _solved(gears: Mapping[int, Toothing], stages: Sequence[Stage]) -> dict[int, Toothing]:
-    """Give every gear a profile shift."""
     solved = dict(gears)
     open_stages = list(stages)
     while open_stages:
@@ -218,7 +217,6 @@ def _contradicts_distance(gears: Mapping[int, Toothing], stage: Stage) -> bool:
 
 
 def _shift_sums(gears: Mapping[int, Toothing], stage: Stage) -> tuple[float, float]:
-    """Sum of the existing shifts, and the sum that the centre distance requires."""
     pinion = gears[stage.pinion]
     gear = gears[stage.gear]
     assert pinion.signed_shift is not None and gear.signed_shift is not None
