@@ -13,7 +13,6 @@ from exugear.cli.case import check_choice, read_gearbox
 from exugear.cli.console import BadInputError, FailedError, check_results_folder, make_results_folder, note, warn
 from exugear.cli.options import VARIANT_DESCRIPTIONS
 from exugear.gearbox.choice import Choice
-from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.variant import Variant
 from exugear.project import Project, results_folder
@@ -249,16 +248,12 @@ def open_project(
             known = ", ".join(gearbox.case.excitations) or "none in the file"
             raise BadInputError(f"--without {name}: no such excitation; choose one of: {known}")
     gearbox = gearbox.varied({f"excitations.{name}.enabled": False for name in without}) if without else gearbox
-    choice = Choice(variant or _chosen_variant(gearbox), str(mesh_model), inertias, load_case)
+    if variant is None:
+        variant = usual_variant(gearbox)
+        if reason := lacking(gearbox, Variant.bushing):
+            note(f"Variant {variant} ({VARIANT_DESCRIPTIONS[variant]}): bushing is not available, {reason}")
+    choice = Choice(variant, str(mesh_model), inertias, load_case)
     folder = results_folder(case, out)
     check_choice(gearbox, choice, folder)
     check_results_folder(folder)
     return WatchedProject(gearbox, folder, choice)
-
-
-def _chosen_variant(gearbox: Gearbox) -> Variant:
-    """Return the usual variant of a gearbox, and print which one it is if bearings are not available."""
-    variant = usual_variant(gearbox)
-    if reason := lacking(gearbox, Variant.bushing):
-        note(f"Variant {variant} ({VARIANT_DESCRIPTIONS[variant]}): bushing is not available, {reason}")
-    return variant

@@ -100,10 +100,12 @@ class Channels(ReprMixin):
         places = tuple(self._place(name) for name, _ in wanted)
         units = [self._unit(place, quantity) for place, (_, quantity) in zip(places, wanted, strict=True)]
         factors = np.array([unit.factor for unit in units])
-        second = self._second()
+        clock = unit_of(self.time_unit.strip("() []") or "s", any_case=True)
+        if clock is None or clock.quantity != "time":
+            raise LoadFileError(f"{self.path}: time has the unit {self.time_unit!r}; expected s, ms, min or h")
         steps = _Steps(self.path)
         for time, values in self.read(places):
-            instants = second * time
+            instants = clock.factor * time
             steps.check(instants)
             found = values * factors
             bad = np.argwhere(~np.isfinite(found))
@@ -116,12 +118,6 @@ class Channels(ReprMixin):
             yield instants, found
         if steps.count < LEAST_LINES:
             raise LoadFileError(f"{self.path}: {steps.count} time steps; at least {LEAST_LINES} are required")
-
-    def _second(self) -> float:
-        unit = unit_of(self.time_unit.strip("() []") or "s", any_case=True)
-        if unit is None or unit.quantity != "time":
-            raise LoadFileError(f"{self.path}: time has the unit {self.time_unit!r}; expected s, ms, min or h")
-        return unit.factor
 
     def _unit(self, place: int, quantity: str) -> Unit:
         unit = unit_of(self.units[place], any_case=True)

@@ -374,13 +374,10 @@ class _RatedTooth:
         roughness = 0.5 * (roughness_of(strength) + roughness_of(mate))
         still = lubricant_factor(softer, self.gearbox.viscosity_40)
         still *= roughness_factor(softer, roughness, reduced_radius(self.pair))
-        moving = np.array([velocity_factor(softer, self._velocity(float(value))) for value in speed])
-        return si(strength, "sigma_H_lim_MPa") * still * moving
-
-    def _velocity(self, speed: float) -> float:
-        """Return the pitch line velocity (m/s) at a speed (rad/s) of the loaded body."""
         gear = (self.pair.pinion, self.pair.gear)[self.tooth.member]
-        return speed * self.tooth.cycles / len(self.tooth.meshes) * gear.reference_radius
+        velocity = speed * self.tooth.cycles / len(self.tooth.meshes) * gear.reference_radius
+        moving = np.array([velocity_factor(softer, float(value)) for value in velocity])
+        return si(strength, "sigma_H_lim_MPa") * still * moving
 
 
 def roughness_of(strength: StrengthSection) -> float:

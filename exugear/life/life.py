@@ -156,20 +156,17 @@ def needs_of_relief(gearbox: Gearbox, flanks: Iterable[FlankLife]) -> Iterator[s
     for family, share in largest.items():
         if share > LEAST_OUTSIDE:
             gears = (pairs[family].pinion.name, pairs[family].gear.name)
-            given = " and ".join(filter(None, (_relief_in_words(gearbox, name) for name in gears)))
+            reliefs = {name: gearbox.case.gears[name].modification for name in gears}
+            given = " and ".join(
+                f"{relief.tip_relief_um:g} µm of tip relief on {name}"
+                for name, relief in reliefs.items()
+                if relief is not None and relief.tip_relief_um
+            )
             remedy = given and f"present: {given}; increase its amount or length"
             yield (
                 f"{family}: up to {100.0 * share:.1f} % of the load is outside the path of contact (tip-edge "
                 f"contact), where no stress is rated: {remedy or 'add tip relief'}"
             )
-
-
-def _relief_in_words(gearbox: Gearbox, name: str) -> str:
-    """Describe the tip relief of a gear in the file; empty without one."""
-    modification = gearbox.case.gears[name].modification
-    if modification is None or not modification.tip_relief_um:
-        return ""
-    return f"{modification.tip_relief_um:g} µm of tip relief on {name}"
 
 
 TOLD_SHARING = 1.0005

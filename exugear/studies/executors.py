@@ -36,7 +36,7 @@ from exugear.gearbox.named_files import Permissions
 from exugear.gearbox.reading import GearboxFileError
 from exugear.results.folder import peak_memory
 from exugear.studies.point_results import PointError, PointResults, PointSettings, Shared
-from exugear.studies.quantities import Output, Values
+from exugear.studies.quantities import Output
 from exugear.studies.sampling import changed
 from exugear.system.gearbox_checks import check_parts
 from fe_ste.tools.files import FileError, open_regular, write_all
@@ -257,7 +257,11 @@ def compute_point(task: Task, work: PointInput) -> Record:
         results = PointResults(gearbox, task.choice, task.settings, Shared(task.folder / SHARED_FOLDER), folder)
         for name, kept in task.outputs.items():
             try:
-                values[name] = _journal_form(kept.of(results))
+                found = kept.of(results)
+                if isinstance(found, Mapping):
+                    values[name] = {label: json_number(float(value)) for label, value in found.items()}
+                else:
+                    values[name] = json_number(float(found))
             except PointError as reason:  # the other outputs of the point are valid
                 error += f"{'; ' if error else ''}outputs.{name}: {reason}"
         doubts = list(results.doubts)
@@ -283,12 +287,6 @@ def _built(task: Task, work: PointInput) -> Gearbox:
         ]
         more = [f"and {len(lines) - SHOWN_VALUES} more"] if len(lines) > SHOWN_VALUES else []
         raise GearboxFileError(*("; ".join([*lines[:SHOWN_VALUES], *more]) for _ in lines[:1]), *error.errors) from None
-
-
-def _journal_form(values: Values) -> Any:
-    if isinstance(values, Mapping):
-        return {name: json_number(float(value)) for name, value in values.items()}
-    return json_number(float(values))
 
 
 CONNECT_SECONDS = 30.0

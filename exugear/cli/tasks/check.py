@@ -34,7 +34,12 @@ from exugear.transient.runup import BAND
 
 def check(case: Path, allow_dir: Path | None, as_json: bool, whole: bool) -> None:
     """Check a gearbox file and print its summary."""
-    gearbox = _read(case, allow_dir, as_json)
+    try:
+        gearbox = read_gearbox(case, allow_dir, tell=False)
+    except BadInputError as error:
+        if as_json and isinstance(error.__cause__, GearboxFileError):
+            print_json({"case": str(case), "errors": list(error.__cause__.errors)})
+        raise
     summary = summarise(gearbox)
     # A wrong sign of a torque has consequences among the other warnings: seals and bearings that turn too fast.
     warnings = [f"load_cases.{own['load_case']}: {line}" for own in summary["load_cases"] for line in own["doubts"]]
@@ -47,16 +52,6 @@ def check(case: Path, allow_dir: Path | None, as_json: bool, whole: bool) -> Non
         findings=[*(Finding("warning", line) for line in warnings), *_opposed_bearings(gearbox)],
         remarks=[*summary["matrices"], *availability(summary)],
     ).show(as_json, whole)
-
-
-def _read(case: Path, allow_dir: Path | None, as_json: bool) -> Gearbox:
-    """Read the file; if it has errors and JSON is requested, print them as an object, too."""
-    try:
-        return read_gearbox(case, allow_dir, tell=False)
-    except BadInputError as error:
-        if as_json and isinstance(error.__cause__, GearboxFileError):
-            print_json({"case": str(case), "errors": list(error.__cause__.errors)})
-        raise
 
 
 def _opposed_bearings(gearbox: Gearbox) -> Iterator[Finding]:
@@ -90,6 +85,9 @@ def summarise(gearbox: Gearbox) -> dict[str, Any]:
     variants = {str(variant): lacking(gearbox, variant) for variant in OFFERED}
     assemblies = _assemblies(gearbox, variants)
     bearings, doubts = _bearing_summaries(gearbox, assemblies.get(Variant.bushing))
+    assembly = assemblies.get(Variant.bushing) or assemblies.get(Variant.rigid)
+    if isinstance(assembly, Assembly):
+        doubts += filter(None, [unusual_damping(modes_of(assembly))])
     return {
         "case": gearbox.source,
         "name": gearbox.name,
@@ -115,7 +113,7 @@ def summarise(gearbox: Gearbox) -> dict[str, Any]:
         },
         "matrices": list(external_facts(gearbox)),
         "life": {verb: list(reasons) for verb, reasons in missing_for_life(gearbox).items()},
-        "warnings": [*gearbox_warnings(gearbox), *doubts, *_damping_warnings(assemblies)],
+        "warnings": [*gearbox_warnings(gearbox), *doubts],
     }
 
 
@@ -131,14 +129,6 @@ def _assemblies(gearbox: Gearbox, variants: Mapping[str, str]) -> dict[Variant, 
         except FailedError as error:
             found[variant] = error
     return found
-
-
-def _damping_warnings(assemblies: Mapping[Variant, Assembly | FailedError]) -> list[str]:
-    """Return warnings about modes with unusual damping, for rigid bodies with the mesh stiffness of ISO 6336-1."""
-    assembly = assemblies.get(Variant.bushing) or assemblies.get(Variant.rigid)
-    if assembly is None or isinstance(assembly, FailedError):
-        return []
-    return list(filter(None, [unusual_damping(modes_of(assembly))]))
 
 
 def pair_summary(gearbox: Gearbox, name: str) -> dict[str, Any]:

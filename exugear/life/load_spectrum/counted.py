@@ -228,6 +228,15 @@ class CountedLoads(ReprMixin, line=" on {body!r}: {sources!n} sources, {distribu
         }
 
 
+def forces_of_families(gearbox: Gearbox, body: str) -> dict[str, float]:
+    """Return the static force F_bt of mesh families at 1 N m on a body, N; the largest of each family."""
+    forces = gearbox.train.static_mesh_forces({body: 1.0})
+    families: dict[str, float] = {}
+    for mesh in gearbox.meshes:
+        families[mesh.family] = max(families.get(mesh.family, 0.0), abs(forces[mesh.name]))
+    return families
+
+
 def count_loads(gearbox: Gearbox, progress: Progress | None = None) -> CountedLoads:
     """Read and count the loads of a gearbox file.
 
@@ -244,10 +253,6 @@ def count_loads(gearbox: Gearbox, progress: Progress | None = None) -> CountedLo
     sources = load_sources(gearbox, progress)
     found = distribution(gearbox, sources)
     teeth = tooth_exposures(gearbox, loads.body)
-    forces = gearbox.train.static_mesh_forces({loads.body: 1.0})
-    families: dict[str, float] = {}
-    for mesh in gearbox.meshes:
-        families[mesh.family] = max(families.get(mesh.family, 0.0), abs(forces[mesh.name]))
     series = [source for source in sources if source.series and source.kind == "fatigue" and source.hours.sum() > 0.0]
     hours = np.array([float(history.hours.sum()) for history in series])
     ranges: dict[str, dict[float, float]] = {}
@@ -268,7 +273,7 @@ def count_loads(gearbox: Gearbox, progress: Progress | None = None) -> CountedLo
         equivalent_ranges=ranges,
         teeth=teeth,
         bearings=bearing_turns(gearbox, loads.body),
-        mesh_forces=families,
+        mesh_forces=forces_of_families(gearbox, loads.body),
         bin_value=loads.bin_value,
     )
 

@@ -227,7 +227,10 @@ def load_sources(gearbox: Gearbox, progress: Progress | None = None) -> tuple[Lo
             draft.take(path)
             done += 1
         drafts.append(draft)
-    by_wind = _wind_seconds(drafts)
+    by_wind: dict[float, float] = {}
+    for draft in drafts:
+        for group, pool in draft.pools.items() if draft.section.wind is not None else ():
+            by_wind[group] = by_wind.get(group, 0.0) + pool.seconds
     sources = tuple(draft.source(by_wind) for draft in drafts)
     yearly = sum(float(source.hours.sum()) for source in sources) / loads.life_years
     if yearly > HOURS_PER_YEAR * (1.0 + 1e-9):
@@ -541,15 +544,6 @@ def _hours_in(row: Sequence[str]) -> float | None:
     if 0.0 <= hours <= HOURS_PER_YEAR:
         return hours
     return None
-
-
-def _wind_seconds(drafts: Sequence[_SourceDraft]) -> dict[float, float]:
-    """Return the total length of the files of each wind speed bin over all sources, s."""
-    seconds: dict[float, float] = {}
-    for draft in drafts:
-        for group, pool in draft.pools.items() if draft.section.wind is not None else ():
-            seconds[group] = seconds.get(group, 0.0) + pool.seconds
-    return seconds
 
 
 def describe_sources(sources: tuple[LoadSource, ...]) -> Iterator[str]:

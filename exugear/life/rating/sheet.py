@@ -26,6 +26,7 @@ from exugear.life.load_spectrum.counted import (
     ToothExposure,
     bearing_turns,
     distinct,
+    forces_of_families,
     tooth_exposures,
 )
 from exugear.life.load_spectrum.counting import LoadPoints, load_duration
@@ -402,10 +403,6 @@ def nominal_loads(gearbox: Gearbox, rating: RatingSection, factor: float = 1.0) 
     torque *= factor
     hours = rating.nominal_hours or LONGEST / least * 2.0 * math.pi / speed / 3600.0
     duration = load_duration(np.array([torque]), np.array([speed]), np.array([hours]), 1)
-    forces = gearbox.train.static_mesh_forces({body: 1.0})
-    families: dict[str, float] = {}
-    for mesh in gearbox.meshes:
-        families[mesh.family] = max(families.get(mesh.family, 0.0), abs(forces[mesh.name]))
     return CountedLoads(
         body=body,
         life_years=hours / HOURS_PER_YEAR,
@@ -417,7 +414,7 @@ def nominal_loads(gearbox: Gearbox, rating: RatingSection, factor: float = 1.0) 
         equivalent_ranges={},
         teeth=teeth,
         bearings=bearing_turns(gearbox, body),
-        mesh_forces=families,
+        mesh_forces=forces_of_families(gearbox, body),
         bin_value="mean",
     )
 

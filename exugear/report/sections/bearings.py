@@ -86,8 +86,12 @@ def _forces(data: Mapping[str, Any], group: RunGroup, variant: str) -> dict[str,
         return None
     largest = max(figures["amplitude"] for figures in loudest.values())
     felt = NOISE_OF_ALL * max(max(figures["amplitude"], figures["mean"] or 0.0) for figures in loudest.values())
+    # Smaller forces are only rounding error compared with those at other bearings.
     loudest = {
-        name: {**figures, **{kind: _above(figures[kind], felt) for kind in ("mean", "amplitude")}}
+        name: {
+            **figures,
+            **{kind: own if (own := figures[kind] or 0.0) > felt else 0.0 for kind in ("mean", "amplitude")},
+        }
         for name, figures in loudest.items()
     }
     caption = f"Radial forces {Variant.of(variant).label}, {group.source}"
@@ -119,7 +123,9 @@ def _force_row(
     swings = Cell(figure_text(1e-3 * amplitude), 1e-3 * amplitude, bar=amplitude / largest)
     measures = {"amplitude / kN": swings}
     if not group.responses:
-        axial = _without_noise(1e-3 * figures["axial"], mean)
+        axial = 1e-3 * figures["axial"]
+        if not abs(axial) > NOISE * 1e-3 * mean:  # round-off, or from the start-up
+            axial = 0.0
         measures = {
             "mean radial force / kN": Cell(figure_text(1e-3 * mean), 1e-3 * mean),
             "mean axial force / kN": Cell(figure_text(axial), axial),
@@ -137,20 +143,6 @@ def _force_row(
         "speed / rpm": Cell(figure_text(figures["speed"], 4), figures["speed"]),
         "frequency / Hz": Cell(f"{figures['frequency']:.0f}", figures["frequency"]),
     }
-
-
-def _above(force: float | None, felt: float) -> float:
-    """Return the force, or zero where it is only rounding error compared with the forces at other bearings."""
-    if force and force > felt:
-        return force
-    return 0.0
-
-
-def _without_noise(value: float, mean: float) -> float:
-    """Return an axial force (kN), or zero where it is negligible (round-off, start-up) against the mean force (N)."""
-    if abs(value) > NOISE * 1e-3 * mean:
-        return value
-    return 0.0
 
 
 def _accelerations(material: ReportData, data: xr.Dataset) -> dict[str, Any] | None:

@@ -6,7 +6,7 @@ import json
 import math
 import platform
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
@@ -363,19 +363,6 @@ def _only(group: RunGroup, variant: str, other: str) -> str:
 # Modes near a target frequency from the gearbox file or the command line, such as a measured one
 
 
-@dataclass(frozen=True)
-class ModelMatch:
-    """Parameter change that shifts a mode of a model to the target frequency."""
-
-    model: Choice
-    match: FrequencyMatch
-
-    @property
-    def assumption(self) -> str:
-        """Parameter with its value."""
-        return f"{self.match.parameter.label} = {self.match.value:.3g}"
-
-
 def _target(material: ReportData) -> dict[str, Any] | None:
     """List the modes near the target frequency, and parameter changes that would shift a mode there."""
     target = material.context.target
@@ -388,20 +375,26 @@ def _target(material: ReportData) -> dict[str, Any] | None:
         visible = nearest_mode(data, target, VISIBLE_SHARE)
         if nearest is None or visible is None:
             continue
-        rows += [
-            _near_row(material, model, data, mode, target) for mode in dict.fromkeys([nearest.index, visible.index])
-        ]
+        for place in dict.fromkeys([nearest.index, visible.index]):
+            mode = report_mode(data, place)
+            near = {
+                "frequency / Hz": f"{mode.frequency:.1f}",
+                "near": "yes" if mode.is_near(target) else "no",
+                "damping / %": f"{100 * mode.damping_ratio:.2f}",
+            }
+            words = material.words.moves(data, place)
+            rows.append({**_model_cells(model), **near, **_mode_cells(material, mode), "mode shape": words})
         material.context.notes.statements.append(_statement(model, data, nearest, visible, target))
     found = [
-        ModelMatch(variation.choice, match)
+        (variation.choice, match)
         for variation in material.variations
         for match in frequency_matches(variation.variations, target, VISIBLE_SHARE)
     ]
     if found:
         entries = "; ".join(
-            f"{own.assumption} instead of {own.match.parameter.default:g} ({model_label(own.model)}: "
-            f"{own.match.frequency:.0f} Hz)"
-            for own in found
+            f"{match.parameter.label} = {match.value:.3g} instead of {match.parameter.default:g} "
+            f"({model_label(model)}: {match.frequency:.0f} Hz)"
+            for model, match in found
         )
         material.context.notes.statements.append(
             f"Assumptions that shift a mode with TE participation to {target:.0f} Hz: {entries}."
@@ -412,25 +405,11 @@ def _target(material: ReportData) -> dict[str, Any] | None:
         "visible": 100 * VISIBLE_SHARE,
         "within": 100 * NEAR,
         "matches": Table(
-            [_match_row(material, own, target) for own in found],
+            [_match_row(material, model, match, target) for model, match in found],
             ("inertia set", "assumption", "mode shape"),
             caption="Assumptions",
             name="matches",
         ),
-    }
-
-
-def _near_row(material: ReportData, model: Choice, data: xr.Dataset, index: int, target: float) -> dict[str, object]:
-    mode = report_mode(data, index)
-    return {
-        "variant": model.variant,
-        "inertia set": f"{model.inertias} ({MESH_MODEL_LABELS[model.mesh_model]})",
-        "frequency / Hz": f"{mode.frequency:.1f}",
-        "near": "yes" if mode.is_near(target) else "no",
-        "damping / %": f"{100 * mode.damping_ratio:.2f}",
-        "TE part. / %": f"{100 * mode.share:.1f}",
-        "amplification": Cell(f"{mode.amplification:.2f} ({material.words.of(mode.mesh)})", mode.amplification),
-        "mode shape": material.words.moves(data, index),
     }
 
 
@@ -453,36 +432,36 @@ def _statement(model: Choice, data: xr.Dataset, nearest: ModeReport, visible: Mo
     )
 
 
-def _match_row(material: ReportData, found: ModelMatch, target: float) -> dict[str, object]:
-    match = found.match
-    data = match.modes.to_dataset()
-    mode = report_mode(data, match.index)
+def _model_cells(model: Choice) -> dict[str, object]:
+    return {"variant": model.variant, "inertia set": f"{model.inertias} ({MESH_MODEL_LABELS[model.mesh_model]})"}
+
+
+def _mode_cells(material: ReportData, mode: ModeReport) -> dict[str, object]:
     return {
-        "variant": found.model.variant,
-        "inertia set": f"{found.model.inertias} ({MESH_MODEL_LABELS[found.model.mesh_model]})",
-        "assumption": material.words.change(match.parameter.label, match.value, match.parameter.default),
-        "frequency / Hz": f"{mode.frequency:.0f}",
         "TE part. / %": f"{100 * mode.share:.1f}",
         "amplification": Cell(f"{mode.amplification:.2f} ({material.words.of(mode.mesh)})", mode.amplification),
-        (
-            f"nearest with TE participation in {REFERENCE_VARIANT} / Hz"
-        ): f"{_reference_frequency(material, found, target):.0f}",
-        "mode shape": material.words.moves(data, match.index),
     }
 
 
-def _reference_frequency(material: ReportData, found: ModelMatch, target: float) -> float:
-    """Return the frequency (Hz) of the nearest visible mode of the reference variant with the same parameter value."""
+def _match_row(material: ReportData, model: Choice, match: FrequencyMatch, target: float) -> dict[str, object]:
+    """Return a parameter change, with the nearest visible mode of the reference variant for the same value."""
     context = material.context
-    match = found.match
-    reference = replace(found.model, variant=REFERENCE_VARIANT)
-    parameters = assumed_parameters(context.gearbox, reference, context.stiffness(found.model.mesh_model))
+    reference = replace(model, variant=REFERENCE_VARIANT)
+    parameters = assumed_parameters(context.gearbox, reference, context.stiffness(model.mesh_model))
     same = next((parameter for parameter in parameters if parameter.label == match.parameter.label), None)
     assembly = same.build(match.value) if same else context.assembled(reference)
     nearest = nearest_mode(modes_of(assembly).to_dataset(), target, VISIBLE_SHARE)
-    if nearest:
-        return nearest.frequency
-    return math.nan
+    frequency = nearest.frequency if nearest else math.nan
+    data = match.modes.to_dataset()
+    mode = report_mode(data, match.index)
+    return {
+        **_model_cells(model),
+        "assumption": material.words.change(match.parameter.label, match.value, match.parameter.default),
+        "frequency / Hz": f"{mode.frequency:.0f}",
+        **_mode_cells(material, mode),
+        f"nearest with TE participation in {REFERENCE_VARIANT} / Hz": f"{frequency:.0f}",
+        "mode shape": material.words.moves(data, match.index),
+    }
 
 
 # Studies
