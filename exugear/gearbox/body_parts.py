@@ -225,10 +225,6 @@ def pin_offsets(origin: Origin, bodies: Mapping[str, Body]) -> dict[str, tuple[f
 def load_cases(origin: Origin, spinning: Sequence[str]) -> dict[str, LoadCase]:
     """Load cases by name.
 
-    Parameters
-    ----------
-    spinning : names of the bodies that can rotate
-
     Raises
     ------
     GearboxFileError

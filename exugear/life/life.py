@@ -220,10 +220,6 @@ def rating_of(gearbox: Gearbox) -> RatingSection:
 def checked_loads(gearbox: Gearbox, progress: Progress | None = None) -> CountedLoads:
     """Read the load spectrum, and check all required input before the computation begins.
 
-    Parameters
-    ----------
-    progress : called with the number of files read and the total
-
     Raises
     ------
     GearboxFileError

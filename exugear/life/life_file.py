@@ -209,12 +209,7 @@ class StoredLife:
 
 
 def stored_lives(gearbox: Gearbox, folder: Path, assembled: Callable[[Choice], Assembly]) -> Iterator[StoredLife]:
-    """Read all ratings of a folder.
-
-    Parameters
-    ----------
-    assembled : returns the model for given settings
-    """
+    """Read all ratings of a folder."""
     for path in sorted(folder.glob("*/*/life.nc")):
         try:
             data = read_life(path)

@@ -332,10 +332,6 @@ def _inner_rings(assembly: Assembly, q: Floats) -> tuple[Floats, Floats]:
 class KeptAngles(ReprMixin):
     """Solved angles in one file, which is rewritten with each.
 
-    Parameters
-    ----------
-    store : for all input of the rating
-
     Examples
     --------
     >>> from pathlib import Path

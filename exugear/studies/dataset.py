@@ -31,11 +31,7 @@ _LOCAL = "slope_"
 
 
 def dataset_of(study: Study, records: Mapping[str, Record]) -> xr.Dataset:
-    """Combine finished points into a dataset; missing and failed points are NaN, with the reason in `error`.
-
-    Parameters
-    ----------
-    records : by hash
+    """Combine records by hash into a dataset; missing and failed points are NaN, with the reason in `error`.
 
     Returns
     -------

@@ -155,12 +155,7 @@ class Journal:
 
 
 def read_journals(folder: Path, wanted: Collection[str]) -> dict[str, Record]:
-    """Return the finished points of a folder among those wanted; a success has priority over a failure.
-
-    Parameters
-    ----------
-    wanted : hashes
-    """
+    """Return the finished points of a folder among those wanted (hashes); a success has priority over a failure."""
     journals: dict[str, Record] = {}
     for path in sorted((folder / FOLDER).glob(f"*{_END}")):
         try:
@@ -341,12 +336,7 @@ def processes(workers: int | None = None) -> Opens:
 
 
 def dask_cluster(address: str) -> Opens:
-    """Return the workers of a Dask scheduler; they need access to the same folders as this process.
-
-    Parameters
-    ----------
-    address : such as ``tcp://10.0.0.1:8786``
-    """
+    """Return the workers of a Dask scheduler (``tcp://10.0.0.1:8786``), which need the same folders as this process."""
 
     @contextmanager
     def opened() -> Iterator[Pool]:
@@ -388,13 +378,7 @@ def given(executor: StudyExecutor, workers: int | None = None) -> Opens:
 
 
 class PersistentPool:
-    """Workers that are kept for several calls, and restarted only after they were lost.
-
-    Parameters
-    ----------
-    opens : callable
-        Starts workers.
-    """
+    """Workers that are kept for several calls, and restarted only after they were lost."""
 
     def __init__(self, opens: Opens) -> None:
         self._opens = opens

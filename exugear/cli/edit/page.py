@@ -14,12 +14,7 @@ LIBRARIES = ("codemirror.min.js", "three.min.js", "uPlot.iife.min.js")
 
 
 def edit_page(case: Path, nonce: str) -> bytes:
-    """Return the page of a gearbox file, without its text.
-
-    Parameters
-    ----------
-    nonce : random text, for the style elements of the editor
-    """
+    """Return the page of a gearbox file, without its text; the style elements of the editor have a nonce."""
     data: dict[str, Any] = {
         "name": case.name,
         **NO_RESULTS,

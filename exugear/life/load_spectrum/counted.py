@@ -240,10 +240,6 @@ def forces_of_families(gearbox: Gearbox, body: str) -> dict[str, float]:
 def count_loads(gearbox: Gearbox, progress: Progress | None = None) -> CountedLoads:
     """Read and count the loads of a gearbox file.
 
-    Parameters
-    ----------
-    progress : called with the number of files read and the total
-
     Raises
     ------
     GearboxFileError

@@ -202,10 +202,6 @@ LEAST_SHARE_BACKWARDS = 0.05
 def load_sources(gearbox: Gearbox, progress: Progress | None = None) -> tuple[LoadSource, ...]:
     """Read all sources of a gearbox file.
 
-    Parameters
-    ----------
-    progress : called with the number of files read and the total
-
     Raises
     ------
     GearboxFileError

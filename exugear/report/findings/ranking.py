@@ -564,12 +564,7 @@ def is_over_speed(response: xr.Dataset) -> bool:
 
 
 def highest_drawn(gearbox: Gearbox, response: xr.Dataset, ranking: Ranking | None = None) -> float:
-    """Return the highest frequency (Hz) drawn for a steady-state response: of the meshes, and of the first resonances.
-
-    Parameters
-    ----------
-    ranking : its first resonances are drawn, too
-    """
+    """Return the highest frequency (Hz) drawn for a steady-state response: of meshes and of the first resonances."""
     fastest = float(np.abs(response["speed"]).max())
     first = () if ranking is None else ranking.resonances[:DRAWN]
     frequencies = [*gearbox.train.mesh_frequencies(fastest).values(), *(own.frequency for own in first)]

@@ -190,10 +190,6 @@ class Labels:
     def causes(self, order: float, before: str = "") -> str:
         """Name the excitations of the file at an order of the input in parentheses; empty if there are none.
 
-        Parameters
-        ----------
-        before : text before the names
-
         Examples
         --------
         >>> ripple = {"body": "hss", "orders": [6], "torque_N_m": [5.0]}
