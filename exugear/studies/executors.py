@@ -543,7 +543,7 @@ class _Running:
 
 
 def compute_points(task: Task, points: Iterable[PointInput], opens: Opens, tell: Tell) -> dict[str, Record]:
-    """Compute points on workers.
+    """Compute points on workers; return their records by hash.
 
     Parameters
     ----------
@@ -551,10 +551,6 @@ def compute_points(task: Task, points: Iterable[PointInput], opens: Opens, tell:
         Starts workers, as `exugear.studies.executors.processes`; called again when they are lost.
     tell : callable
         Called with each returned record.
-
-    Returns
-    -------
-    by the hash of the point
 
     Raises
     ------

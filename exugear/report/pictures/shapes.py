@@ -307,16 +307,12 @@ def _carrier(gearbox: Gearbox, body: Body, planets: Sequence[Body]) -> list[Tria
 
 
 def displacement_of(body: BodyShape, motion: ArrayLike) -> Floats:
-    """Return the displacement of each point of a body for a small motion.
+    """Return the displacement (n, 3), m, of each point of a body for a small motion.
 
     Parameters
     ----------
     body : the body, n points
     motion : (6,) displacement (m) of the reference point and rotations (rad) about x, y, z
-
-    Returns
-    -------
-    (n, 3) m
     """
     return np.asarray(_displaced(body, np.asarray(motion, dtype=np.float64)))
 
@@ -378,7 +374,7 @@ def largest_displacement(vibrations: Sequence[Complexes]) -> complex:
 
 
 def placed(body: BodyShape, motion: ArrayLike) -> Floats:
-    """Return the points of a body after a motion that may be large: a finite rotation, then a translation.
+    """Return the points (n, 3), m, of a body after a motion that may be large: a finite rotation, then a translation.
 
     Linear displacements would enlarge a gear that rotates by a drawn amplitude; a finite rotation keeps its size.
 
@@ -386,10 +382,6 @@ def placed(body: BodyShape, motion: ArrayLike) -> Floats:
     ----------
     body : the body, n points
     motion : (6,) as in `displacement_of`, the rotations as a rotation vector
-
-    Returns
-    -------
-    (n, 3) m
     """
     matrix = motion_matrix(body.reference, motion)
     points: Floats = body.surface.points @ matrix[:3, :3].T + matrix[:3, 3]
