@@ -70,12 +70,7 @@ def _speeds(ranking: Ranking) -> str:
 
 
 def resonance_table(gearbox: Gearbox, ranking: Ranking, model: str) -> Table:
-    """Return the table of a ranking: the quantity that decides first, with its range over the damping.
-
-    Parameters
-    ----------
-    model : what the ranking is of, as text
-    """
+    """Return the table of the ranking of a model: the quantity that decides first, with its range over the damping."""
     resonances = [resonance.summary() for resonance in ranking.resonances]
     first, body = ranking.quantity, gearbox.case.overall.input
     where = "all speeds" if ranking.whole else "operating range"

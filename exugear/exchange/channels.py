@@ -85,11 +85,7 @@ class Channels(ReprMixin):
         return np.concatenate([values[:, 0] for _, values in self.blocks([(name, quantity)])])
 
     def blocks(self, wanted: Sequence[tuple[str, str]]) -> Iterator[tuple[Floats, Floats]]:
-        """Yield time (s) and some channels (SI) in blocks, (n,) and (n, channels), so that no whole file is in memory.
-
-        Parameters
-        ----------
-        wanted : name and quantity of each channel, as in `channel`
+        """Yield time (s) and channels by name and quantity (SI) in blocks, (n,) and (n, channels), to save memory.
 
         Raises
         ------

@@ -534,11 +534,7 @@ class Gearbox(ReprMixin):
         return self.train.rolling({self.case.overall.input: case.start_speed, **case.start_speeds})
 
     def mesh_orders(self, count: int = 3) -> dict[str, float]:
-        """Orders of all meshes with harmonics, by name; meshes of equal frequency (sun and ring) share an order.
-
-        Parameters
-        ----------
-        count : harmonics of each mesh, including the first
+        """Orders of all meshes with `count` harmonics, by name; meshes of equal frequency share an order.
 
         Examples
         --------

@@ -267,15 +267,11 @@ class Train(
         return self.rolling({body: speed})
 
     def rolling(self, speeds: Mapping[str, float]) -> dict[str, float]:
-        """Speeds of all bodies (rad/s) of the kinematic gear train for given speeds of some bodies.
+        """Speeds of all bodies (rad/s) of the kinematic gear train for given speeds (rad/s) of some bodies by name.
 
         In a train of several degrees of freedom, locked bodies are stationary. Exceptions are bodies that rotate with
         the first one given, with the input or with the output, and bodies that cannot be stationary at the given
         speeds.
-
-        Parameters
-        ----------
-        speeds : by body name, rad/s
 
         Raises
         ------

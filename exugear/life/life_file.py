@@ -236,12 +236,7 @@ LARGEST_DAMAGE = 1e6
 
 
 def draw_life(data: xr.Dataset, path: str | Path | None = None) -> Figure:
-    """Draw the damages of the limiting parts, and their distribution over torque.
-
-    Parameters
-    ----------
-    data : as `exugear.life.life_file.read_life` returns it
-    """
+    """Draw the damages of the limiting parts of a stored life, and their distribution over torque."""
     shown = [limit for limit in limits(data) if limit[2] > LEAST_DAMAGE][:SHOWN]
     with drawing_style():
         figure = new_figure(8.5, max(2.2, 0.8 + 0.24 * len(shown)))

@@ -229,12 +229,7 @@ def case_digest(gearbox: Gearbox, of_life: bool = False) -> str:
 
 
 def stored_studies(folder: Path, gearbox: Gearbox) -> Iterator[StoredStudy]:
-    """Find the studies in a results folder, without files of other versions or other content.
-
-    Parameters
-    ----------
-    gearbox : gearbox to which the folder belongs
-    """
+    """Find the studies of a gearbox in a results folder, without files of other versions or other content."""
     for path in sorted((folder / STUDIES).glob(f"*/{DATASET}")):
         try:
             with open_dataset(path, STUDY_LAYOUT) as data:

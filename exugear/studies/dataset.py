@@ -297,12 +297,7 @@ def is_pareto_optimal(outputs: Floats) -> Booleans:
 def searched_dataset(
     study: Study, criteria: Criteria, points: Sequence[EvaluatedPoint], records: Mapping[str, Record]
 ) -> xr.Dataset:
-    """Return all evaluated points of an optimisation in their order, with the percentiles used as criteria.
-
-    Parameters
-    ----------
-    records : by hash
-    """
+    """Return all evaluated points of an optimisation in their order, with the percentiles used as criteria."""
     dataset = dataset_of(replace(study, design=_design(study, points)), records)
     judged = {side: _judged(dataset, study, criteria, *side) for side in criteria.sides}
     words = {"long_name": "whether all limits are met"}

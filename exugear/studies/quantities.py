@@ -611,11 +611,7 @@ class Output:
 
 
 def outputs_of(sections: Mapping[str, Mapping[str, Any]], known: Mapping[str, OutputKind]) -> dict[str, Output]:
-    """Check the sections of a study file and return the outputs they specify.
-
-    Parameters
-    ----------
-    sections : by the name in the dataset: ``quantity`` and its options
+    """Check the sections of a study file, by their names in the dataset, and return the outputs they specify.
 
     Raises
     ------

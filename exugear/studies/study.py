@@ -352,11 +352,7 @@ class Study(ReprMixin):
         permissions: Permissions = NOTHING_MORE,
         quantities: Mapping[str, OutputKind] = QUANTITIES,
     ) -> Study:
-        """Read and check a study file and its gearbox file.
-
-        Parameters
-        ----------
-        permissions : of the gearbox file
+        """Read and check a study file and its gearbox file, to which the permissions apply.
 
         Raises
         ------

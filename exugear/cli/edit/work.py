@@ -73,12 +73,7 @@ def _reason(lines: list[str]) -> str:
 
 
 class LongWork:
-    """Long computations of one gearbox file, one at a time.
-
-    Parameters
-    ----------
-    allow_dir : another folder whose files the gearbox file may name
-    """
+    """Long computations of one gearbox file, one at a time."""
 
     def __init__(self, case: Path, folder: Path, allow_dir: Path | None = None) -> None:
         self._case = case

@@ -33,13 +33,9 @@ _MOST_CHUNKS = 10_000
 
 
 def read_wav(path: Path, wanted: Sequence[str] | None = None) -> Recording:
-    """Channels of a WAV file, named ``channel 1``, ``channel 2``, ... without units.
+    """All or the wanted channels of a WAV file, named ``channel 1``, ``channel 2``, ... without units.
 
     Integers are fractions of full scale, -1 to 1; floats are as written.
-
-    Parameters
-    ----------
-    wanted : names of the channels; all by default
 
     Raises
     ------

@@ -258,11 +258,7 @@ def _take(point: float, stack: list[float], closed: array[float]) -> None:
 
 
 def rainflow(series: Floats) -> tuple[Floats, Floats, Floats]:
-    """Count cycles by the rainflow method of ASTM E1049-85, 5.4.4; the residue gives half cycles.
-
-    Parameters
-    ----------
-    series : (samples,)
+    """Count cycles of a series (samples,) by the rainflow method of ASTM E1049-85, 5.4.4; the residue gives half ones.
 
     Returns
     -------

@@ -157,12 +157,7 @@ def facts_of(
 
 
 def facts_of_response(words: Labels, response: xr.Dataset) -> tuple[SummaryCard, ...]:
-    """Return the finding of a steady-state response without a run-up of the same model settings.
-
-    Parameters
-    ----------
-    response : as `exugear.steady.steady_file.load_response` reads it
-    """
+    """Return the finding of a response from `load_response` without a run-up of the same model settings."""
     top = next(iter(peaks(response)), None)
     if top is None:
         return ()

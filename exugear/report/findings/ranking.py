@@ -529,12 +529,7 @@ class ConstantSpeed:
 
 
 def constant_speed_of(response: xr.Dataset) -> ConstantSpeed:
-    """Return the levels of the overall transmission error of a steady-state response.
-
-    Parameters
-    ----------
-    response : as `exugear.steady.steady_file.load_response` reads it
-    """
+    """Return the levels of the overall transmission error of a steady-state response from `load_response`."""
     speed = np.abs(response["speed"].to_numpy())
     rising = np.argsort(speed, kind="stable")
     signals = [str(name) for name in response["signal"].to_numpy()]

@@ -503,11 +503,7 @@ DRAWN_DEFLECTION = 0.06
 
 
 def draw_free_vibration(body: ReducedBody, number: int, path: str | Path | None = None) -> Figure:
-    """Draw an elastic mode of a free body, coloured by displacement.
-
-    Parameters
-    ----------
-    number : 0 for the first elastic mode
+    """Draw an elastic mode of a free body, number 0 for the first one, coloured by displacement.
 
     Raises
     ------

@@ -148,11 +148,7 @@ class BodyShape:
 
 
 def bodies_of(gearbox: Gearbox) -> tuple[BodyShape, ...]:
-    """Return the shapes of all bodies of a gearbox that have gears or a stepped shaft, or carry planets.
-
-    Parameters
-    ----------
-    gearbox : the gearbox; its gears are rotated so that the teeth mesh
+    """Return the shapes of all bodies with gears (rotated so that the teeth mesh), a stepped shaft or planets.
 
     Returns
     -------
@@ -343,11 +339,7 @@ def vibration_of(body: BodyShape, motion: Complexes) -> Complexes:
 
 
 def peak_displacement(vibration: Complexes) -> Floats:
-    """Return the largest distance (n,) from rest of points that move along ellipses, as Re(vibration exp(i w t)).
-
-    Parameters
-    ----------
-    vibration : (n, 3)
+    """Return the largest distance (n,) from rest of points that move along ellipses Re(vibration exp(i w t)), (n, 3).
 
     Examples
     --------

@@ -98,13 +98,9 @@ class GearboxOrder:
 
 
 def gearbox_orders(gearbox: Gearbox, highest: float) -> tuple[GearboxOrder, ...]:
-    """Orders of all shafts with four multiples, and of all meshes with harmonics and sidebands.
+    """Orders, up to the highest, of all shafts with four multiples, and of all meshes with harmonics and sidebands.
 
     Sidebands are two by each body of the mesh, and of planets one more than their number by the carrier.
-
-    Parameters
-    ----------
-    highest : highest order
 
     Examples
     --------

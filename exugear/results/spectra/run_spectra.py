@@ -433,11 +433,7 @@ class OtherWindow:
 
 
 def other_windows(runs: Sequence[VariantRun], lines: Sequence[OrderLine]) -> tuple[OtherWindow, ...]:
-    """Find the resonances of runs with other window lengths; the memory holds one length at a time.
-
-    Parameters
-    ----------
-    runs : of different variants, analysed with one window length
+    """Find the resonances of runs of different variants with other windows; the memory holds one length at a time.
 
     Raises
     ------

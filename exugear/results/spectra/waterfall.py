@@ -48,11 +48,7 @@ class OrderLine:
 
 
 def order_lines(gearbox: Gearbox, count: int = 3) -> tuple[OrderLine, ...]:
-    """Order lines of all meshes with harmonics; meshes of equal frequency (sun and ring) share a line.
-
-    Parameters
-    ----------
-    count : harmonics of each mesh, including the first
+    """Order lines of all meshes with `count` harmonics; meshes of equal frequency (sun and ring) share a line.
 
     Examples
     --------

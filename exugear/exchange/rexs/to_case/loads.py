@@ -182,11 +182,7 @@ def _free_body(bodies: RigidGroups, shaft: Component | None) -> RigidGroup | Non
 
 
 def ends_of(model: Model, bodies: RigidGroups, loads: Sequence[ImportedLoads], links: Mapping[str, int]) -> Ends:
-    """Determine input and output of the gearbox.
-
-    Parameters
-    ----------
-    links : by body name, number of meshes of each rotating body
+    """Determine input and output of the gearbox; `links` are the numbers of meshes of the rotating bodies.
 
     Raises
     ------
