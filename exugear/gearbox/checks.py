@@ -1,8 +1,4 @@
-"""Consistency checks between the parts of a gearbox: masses, positions, assembly of planets, supports.
-
-Each function compares the parts passed to it and yields error texts with the key, its value and the remedy. `CHECKS`
-lists all of them in order.
-"""
+"""Consistency checks between the parts of a gearbox: masses, positions, assembly of planets, supports."""
 
 from __future__ import annotations
 

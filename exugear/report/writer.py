@@ -1,7 +1,4 @@
-"""Self-contained web page with the report of a results folder: its six parts, headline, controls and footer.
-
-`SECTIONS` has the order of the page; a part is made by a function from `ReportData` to its `Part`.
-"""
+"""Self-contained web page with the report of a results folder: its six parts, headline, controls and footer."""
 
 from __future__ import annotations
 

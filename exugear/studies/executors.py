@@ -208,10 +208,8 @@ class PointInput:
     changes: Mapping[str, Any]
 
 
-@lru_cache(maxsize=4)
-def _journal(folder: Path) -> Journal:
-    """Return the journal of this process; a worker takes batches of one study at a time."""
-    return Journal(folder)
+_journal = lru_cache(maxsize=4)(Journal)
+"""Journal of this process; a worker takes batches of one study at a time."""
 
 
 def compute_batch(task: Task, batch: Sequence[PointInput]) -> list[Record]:
@@ -409,11 +407,6 @@ class PersistentPool:
         self._stack.close()
 
 
-def lost_worker(error: BaseException) -> bool:
-    """Return whether a future's error means the loss of its worker only; `BrokenExecutor` is the loss of all."""
-    return isinstance(error, CancelledError) or type(error).__name__ == "KilledWorker"
-
-
 class Pace:
     """Size of a batch: about half a second of work, which limits both communication and waiting time.
 
@@ -520,7 +513,8 @@ class _Running:
         except BrokenExecutor:
             raise
         except (Exception, CancelledError) as error:
-            if not lost_worker(error):
+            # The loss of its worker only; `BrokenExecutor` is the loss of all.
+            if not (isinstance(error, CancelledError) or type(error).__name__ == "KilledWorker"):
                 raise
             self.again(batch)
             return

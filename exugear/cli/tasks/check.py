@@ -339,10 +339,6 @@ def _dominant_estimate(bearing: Mapping[str, Any]) -> str:
     return re.sub(r"_(mm|um|deg|kN)$", "", key).replace("_", " ")
 
 
-def _radial_load(bearing: Mapping[str, Any]) -> str:
-    return significant(bearing["radial_load_kN"], 3) + "*" * (bearing["reaction_kN"] is not None)
-
-
 def _reaction(bearing: Mapping[str, Any]) -> str:
     key = "radial_load_kN" if bearing["reaction_kN"] is None else "reaction_kN"
     return significant(bearing[key], 3)
@@ -350,7 +346,9 @@ def _reaction(bearing: Mapping[str, Any]) -> str:
 
 BEARINGS = (
     Column("bearing", "bearing"),
-    Column("radial\nload kN", _radial_load),
+    Column(
+        "radial\nload kN", lambda own: significant(own["radial_load_kN"], 3) + "*" * (own["reaction_kN"] is not None)
+    ),
     Column("static\nreact. kN", _reaction),
     Column("axial\nload kN", "axial_load_kN", lambda load: significant(round(load, 3), 3, 2)),
     Column("radial\nstiffness\nGN/m", "radial_stiffness_N_per_m", partial(significant, digits=3, decimals=5), 1e-9),

@@ -345,7 +345,9 @@ class _SourceDraft:
             self._check_table(path)
 
     def _take_series(self, path: Path) -> None:
-        if self.section.kind == "fatigue" and not self._weighed:
+        section = self.section
+        ways = (section.hours_per_year, section.events_per_year, section.hours_table, section.wind)
+        if section.kind == "fatigue" and all(way is None for way in ways):
             raise self.gearbox.error(f"{self.key}.hours_per_year: this key is missing; a time series requires it")
         pool = SamplePool(self.section.kind == "extreme")
         taken = self._reader.take(path, pool)
@@ -362,14 +364,6 @@ class _SourceDraft:
             self.pools[group].merge(pool)
         else:
             self.pools[group] = pool
-
-    @property
-    def _weighed(self) -> bool:
-        section = self.section
-        return any(
-            way is not None
-            for way in (section.hours_per_year, section.events_per_year, section.hours_table, section.wind)
-        )
 
     def _stated_hours(self) -> dict[str, float] | None:
         """Return the hours per year of each file by its name, from a table."""

@@ -1,7 +1,4 @@
-"""List of resonances of a result: those in the operating range first, by the ranking, then those at other speeds.
-
-Tables, diagrams and scripts of the page number resonances by this list.
-"""
+"""List of resonances of a result: those in the operating range first, by the ranking, then those at other speeds."""
 
 from __future__ import annotations
 

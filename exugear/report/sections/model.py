@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import platform
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
@@ -169,7 +169,8 @@ def _excitation_words(material: ReportData) -> Iterator[str]:
     for load in context.gearbox.varying_loads:
         orders.setdefault((load.excitation, load.body), set()).add(load.order)
     acting = [
-        f"{material.words.of(name)} ({_several('order', sorted(own))} of {material.words.of(body)})"
+        f"{material.words.of(name)} (order{'s' * (len(own) > 1)} {', '.join(f'{number:g}' for number in sorted(own))} "
+        f"of {material.words.of(body)})"
         for (name, body), own in orders.items()
     ]
     if acting:
@@ -177,10 +178,6 @@ def _excitation_words(material: ReportData) -> Iterator[str]:
     names = {name for name, _ in orders}
     if without := [material.words.of(name) for name in context.gearbox.case.excitations if name not in names]:
         yield f"Excitations of the file that are left out: {', '.join(without)}."
-
-
-def _several(word: str, numbers: Sequence[float]) -> str:
-    return f"{word}{'s' * (len(numbers) > 1)} {', '.join(f'{number:g}' for number in numbers)}"
 
 
 def _elastic_words(material: ReportData) -> Iterator[str]:

@@ -1,7 +1,4 @@
-"""Diagrams of run-ups: waterfalls with order lines, and levels along the orders.
-
-Functions take spectra of `exugear.results.spectra.waterfall`; they need no display.
-"""
+"""Diagrams of run-ups: waterfalls with order lines, and levels along the orders."""
 
 from __future__ import annotations
 
