@@ -73,9 +73,7 @@ def shortened(line: str) -> str:
     'xxxx must be shorter'
     """
     half = (LONGEST_LINE - 3) // 2
-    if len(line) <= LONGEST_LINE:
-        return line
-    return f"{line[:half]}...{line[-half:]}"
+    return line if len(line) <= LONGEST_LINE else f"{line[:half]}...{line[-half:]}"
 
 
 def say(line: str) -> None:
@@ -122,9 +120,7 @@ def counted(lines: list[str], most: int = MOST_LINES) -> list[str]:
     >>> len(shown), shown[-1]
     (25, 'and 26 more')
     """
-    if len(lines) <= most:
-        return lines
-    return [*lines[: most - 1], f"and {len(lines) - most + 1} more"]
+    return lines if len(lines) <= most else [*lines[: most - 1], f"and {len(lines) - most + 1} more"]
 
 
 class _Description(ProgressColumn):

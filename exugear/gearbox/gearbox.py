@@ -519,9 +519,7 @@ class Gearbox(ReprMixin):
     def output_radius(self) -> float:
         """Base radius of the overall output gear, m; 1 m for a rotor without gears."""
         name = self.case.overall.output_gear
-        if name is None:
-            return 1.0
-        return self.gears[name].base_radius
+        return 1.0 if name is None else self.gears[name].base_radius
 
     def start_speeds(self, case: LoadCase) -> dict[str, float]:
         """Rotational speeds of all bodies at the start of a load case, rad/s.

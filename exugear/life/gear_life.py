@@ -151,9 +151,7 @@ def is_modified(gearbox: Gearbox, pair: GearPair) -> bool:
 
 def auxiliary_factor(gearbox: Gearbox, rating: RatingSection, pair: GearPair) -> float:
     """Return f_ZCa of ISO 6336-2:2019: the value of the file for modified flanks, otherwise 1.2."""
-    if rating.f_ZCa is not None and is_modified(gearbox, pair):
-        return rating.f_ZCa
-    return UNMODIFIED
+    return rating.f_ZCa if rating.f_ZCa is not None and is_modified(gearbox, pair) else UNMODIFIED
 
 
 def warn_beyond_tables(

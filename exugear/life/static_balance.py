@@ -114,9 +114,7 @@ class StaticBalance(ReprMixin, line=": {torque!n} torques, {angle!n} angles, lin
         forces = np.abs(self.at(self.mesh_force, torque, hub)[..., names]).max(axis=(1, 2))
         worst = int(forces.argmax())
         mean = float(np.abs(self.at(self.mesh_force, torque[[worst]])[..., names]).mean())
-        if mean:
-            return float(forces[worst]) / mean
-        return 1.0
+        return float(forces[worst]) / mean if mean else 1.0
 
 
 class States(NamedTuple):

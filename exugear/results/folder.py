@@ -316,9 +316,7 @@ def read_duties(path: Path) -> dict[str, Any]:
 
 
 def _finite(value: float) -> float | None:
-    if math.isfinite(value):
-        return value
-    return None
+    return value if math.isfinite(value) else None
 
 
 def write_duties(

@@ -216,9 +216,7 @@ def _sound(data: xr.Dataset, ranking: Ranking) -> dict[str, Any] | None:
 
 
 def _known(value: float) -> float | None:
-    if math.isfinite(value):
-        return value
-    return None
+    return value if math.isfinite(value) else None
 
 
 def _other_loads(gearbox: Gearbox) -> Iterator[Finding]:

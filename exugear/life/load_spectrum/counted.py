@@ -275,9 +275,7 @@ def count_loads(gearbox: Gearbox, progress: Progress | None = None) -> CountedLo
 
 
 def _weights(source: LoadSource) -> Any:
-    if source.hours.sum() > 0.0:
-        return source.hours
-    return None
+    return source.hours if source.hours.sum() > 0.0 else None
 
 
 # Load duration distributions as CSV tables for other programs

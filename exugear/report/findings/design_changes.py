@@ -192,9 +192,7 @@ def _result_from(content: Mapping[str, Any]) -> ChangeResult:
 
 
 def _number(value: float | None) -> float | None:
-    if value is None:
-        return None
-    return float(value)
+    return None if value is None else float(value)
 
 
 # Effects

@@ -93,30 +93,22 @@ class RankedResonance:
     @property
     def ranking_level(self) -> float:
         """Level (dB) used for the ranking: at constant speed where available, otherwise in the run-up."""
-        if self.constant is None:
-            return self.peak.level
-        return self.constant.level
+        return self.peak.level if self.constant is None else self.constant.level
 
     @property
     def frequency(self) -> float:
         """Frequency of the highest peak, Hz."""
-        if self.constant is None:
-            return self.finding.resonance.frequency
-        return self.constant.frequency
+        return self.finding.resonance.frequency if self.constant is None else self.constant.frequency
 
     @property
     def speed(self) -> float:
         """Absolute input speed at the highest peak, rad/s."""
-        if self.constant is None:
-            return abs(self.peak.speed)
-        return self.constant.speed
+        return abs(self.peak.speed) if self.constant is None else self.constant.speed
 
     @property
     def missed(self) -> float:
         """Level at constant speed minus level in the run-up, dB; 0 if the former is unknown."""
-        if self.constant is None:
-            return 0.0
-        return self.constant.level - self.peak.level
+        return 0.0 if self.constant is None else self.constant.level - self.peak.level
 
 
 @dataclass(frozen=True)
@@ -510,9 +502,7 @@ def _standing_for(names: Sequence[str], swings: Floats, words: Labels) -> Iterat
 
 def _middle(values: Floats) -> Floats:
     third = len(values) // 3
-    if third:
-        return values[MEAN_PART.start * third : MEAN_PART.stop * third]
-    return values
+    return values[MEAN_PART.start * third : MEAN_PART.stop * third] if third else values
 
 
 def _waterfall(values: Floats, data: _Signals, run: VariantRun, unit: str = "N") -> Waterfall:

@@ -494,9 +494,7 @@ class ConstantSpeed:
     def along(self, line: OrderLine) -> Floats | None:
         """Return the level at each speed, dB re 1 µm; None if the response does not contain the order."""
         place = line.place(self.orders)
-        if place is None:
-            return None
-        return self.level[:, place]
+        return None if place is None else self.level[:, place]
 
     def near(self, line: OrderLine, frequency: float, resolution: float) -> OrderPeak | None:
         """Return the highest peak of an order within the resolution of a run-up around a frequency (both Hz).

@@ -279,9 +279,7 @@ def displacement_map() -> Colormap:
 
 
 def _opacity(body: BodyShape) -> float:
-    if body.fixed:
-        return 0.22
-    return 1.0
+    return 0.22 if body.fixed else 1.0
 
 
 def channels(colour: str) -> tuple[float, float, float]:

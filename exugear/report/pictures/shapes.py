@@ -230,9 +230,7 @@ def _has_shaft(body: Body) -> bool:
 
 def _rim(gearbox: Gearbox, body: Body, gear: str) -> float | None:
     """Return the inner diameter of a gear on a shaft (the shaft's); None for planets and rings: the fixed diameter."""
-    if _has_shaft(body) and not gearbox.gears[gear].internal:
-        return _shaft_diameter(gearbox, body)
-    return None
+    return _shaft_diameter(gearbox, body) if _has_shaft(body) and not gearbox.gears[gear].internal else None
 
 
 def _shaft(gearbox: Gearbox, body: Body) -> list[TriangleSurface]:

@@ -213,9 +213,7 @@ def _duties(material: ReportData, assembly: Assembly) -> dict[str, Any] | None:
 
 def _mesh_row(material: ReportData, duty: MeshLoadState) -> dict[str, object]:
     def shown(value: float, form: str) -> str:
-        if math.isnan(value):
-            return "–"
-        return format(value, form)
+        return "–" if math.isnan(value) else format(value, form)
 
     return {
         "mesh": material.words.of(duty.name),

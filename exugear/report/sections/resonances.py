@@ -298,9 +298,7 @@ def _mode_cells(material: ReportData, group: RunGroup | None, variant: str, own:
 
 
 def _number(value: int | None) -> Cell:
-    if value is None:
-        return Cell("–", math.nan)
-    return Cell(str(value), value)
+    return Cell("–", math.nan) if value is None else Cell(str(value), value)
 
 
 def _drawn(
@@ -633,9 +631,7 @@ def _passages(context: Context, carriers: Mapping[str, tuple[str, float]]) -> st
 
 
 def _amplitude(line: str, amplitude: float) -> str:
-    if line.startswith("mesh_force "):
-        return f"{amplitude:.3g} N"
-    return f"{1e6 * amplitude:.3g} µm"
+    return f"{amplitude:.3g} N" if line.startswith("mesh_force ") else f"{1e6 * amplitude:.3g} µm"
 
 
 def _carriers(context: Context) -> dict[str, tuple[str, float]]:
@@ -650,9 +646,7 @@ def _place(data: xr.Dataset, line: OrderLine) -> int | None:
     """Return the index of an order among the spectral components of a response."""
     order = data["order"].to_numpy()
     index = int(np.argmin(np.abs(order - line.order)))
-    if abs(order[index] - line.order) < 1e-6 * line.order:
-        return index
-    return None
+    return index if abs(order[index] - line.order) < 1e-6 * line.order else None
 
 
 def _curves(data: xr.Dataset, runs: Sequence[VariantRun], line: OrderLine) -> list[Curve]:

@@ -204,9 +204,7 @@ def rounded(value: float, digits: int = 5) -> float | None:
     >>> rounded(3.14159265, 3), rounded(float("nan"))
     (3.14, None)
     """
-    if np.isfinite(value):
-        return float(f"{value:.{digits}g}")
-    return None
+    return float(f"{value:.{digits}g}") if np.isfinite(value) else None
 
 
 def rounded_list(values: NDArray[Any], digits: int = 5) -> list[float | None]:

@@ -111,9 +111,7 @@ class Table:
 
 
 def _cell(value: object) -> Cell:
-    if isinstance(value, Cell):
-        return value
-    return Cell(str(value))
+    return value if isinstance(value, Cell) else Cell(str(value))
 
 
 @dataclass(frozen=True)

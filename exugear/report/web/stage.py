@@ -162,9 +162,7 @@ def turn_between(first: BodyShape, other: BodyShape) -> float | None:
     cosine = math.cos(angle)
     sine = math.sin(angle)
     turned = one @ np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-    if float(np.abs(turned - two).max()) < SAME_SHAPE:
-        return angle
-    return None
+    return angle if float(np.abs(turned - two).max()) < SAME_SHAPE else None
 
 
 # Bodies and mode shapes as data for the animated 3-D view

@@ -254,6 +254,4 @@ def likely_speed(spectrum: OrderSpectrum, orders: Sequence[float], candidates: M
         return None
     best = max(known, key=lambda mistake: known[mistake])
     assumed = speed_score(spectrum, orders, 1.0)
-    if known[best] > ABOVE and not known[best] < assumed + CLEARLY:
-        return best
-    return None
+    return best if known[best] > ABOVE and not known[best] < assumed + CLEARLY else None

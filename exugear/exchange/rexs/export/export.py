@@ -193,9 +193,7 @@ class Results(ReprMixin, line=": {additions!n} attributes"):
     def sense(self, component: int) -> int:
         """Sense of a component's u axis: 1 along +z, -1 against it."""
         axes = self.origins.axes.get(component)
-        if axes is None or axes[0, 2] > 0.0:
-            return 1
-        return -1
+        return 1 if axes is None or axes[0, 2] > 0.0 else -1
 
     def gear_data(self, stage: int, gear: Gear) -> int | None:
         """Component with the data of a gear in a stage."""

@@ -176,9 +176,7 @@ def _shaft(model: Model, load: Component) -> Component | None:
 def _free_body(bodies: RigidGroups, shaft: Component | None) -> RigidGroup | None:
     """Body of a shaft unless it is fixed or a planet."""
     body = bodies.body_of(shaft) if shaft else None
-    if body is None or body.fixed or body.carrier:
-        return None
-    return body
+    return None if body is None or body.fixed or body.carrier else body
 
 
 def ends_of(model: Model, bodies: RigidGroups, loads: Sequence[ImportedLoads], links: Mapping[str, int]) -> Ends:

@@ -258,9 +258,7 @@ class ComponentPositions(ReprMixin):
 
     def sense(self, part: Component) -> int:
         """Sense of a component's u axis: 1 along +z, -1 against it."""
-        if self._frame(part, 0)[1][:, 0] @ self._axes[2] > 0.0:
-            return 1
-        return -1
+        return 1 if self._frame(part, 0)[1][:, 0] @ self._axes[2] > 0.0 else -1
 
     def axes(self, part: Component) -> Floats:
         """Axes u, v, w of a component as the rows of a (3, 3) array, in the axes of the gearbox file."""

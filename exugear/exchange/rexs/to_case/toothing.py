@@ -228,9 +228,7 @@ def _shift(flank: Component | None, internal: bool) -> Entry | None:
 
 def _diameter(gear: Component, key: str) -> Entry | None:
     value = gear.quantity(key)
-    if value:
-        return read(tidy(abs(value)), key)
-    return None
+    return read(tidy(abs(value)), key) if value else None
 
 
 def _tip(gear: Component, reference: float, notes: Notes) -> Entry | None:
@@ -328,6 +326,4 @@ def material_table(material: Component | None) -> Entry | None:
     if material is None or is_rigid(material):
         return None
     values = {key: entry.value for key, entry in entries_of(READ["material"], material, zeros=True).items()}
-    if values:
-        return read(values, str(material))
-    return None
+    return read(values, str(material)) if values else None
