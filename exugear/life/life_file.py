@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from exugear.gearbox.choice import Choice
+from exugear.gearbox.choice import Choice, choice_of
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.versions import LIFE
@@ -213,7 +213,7 @@ def stored_lives(gearbox: Gearbox, folder: Path, assembled: Callable[[Choice], A
     for path in sorted(folder.glob("*/*/life.nc")):
         try:
             data = read_life(path)
-            assembly = assembled(Choice(*(str(data.attrs[key]) for key in ("variant", "mesh_model", "inertias"))))
+            assembly = assembled(choice_of(data.attrs))
             counted = checked_loads(gearbox)
             source = source_hash(assembly, rating_of(gearbox), folder)
             tables = {request.name: request.wanted.hash for request in life_requests(assembly, counted, folder)}

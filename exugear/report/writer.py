@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from exugear.gearbox.choice import Choice
+from exugear.gearbox.choice import Choice, choice_of
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import static_load_in_words
 from exugear.gearbox.named_files import Permissions
@@ -19,7 +19,6 @@ from exugear.report.findings.context import (
     ReportError,
     StoredResults,
     bytes_of_runs,
-    choice_of,
     shown_path,
     stored_models,
     with_responses,

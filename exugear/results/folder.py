@@ -272,8 +272,8 @@ def duty_summary(duty: BearingLoadState) -> dict[str, Any]:
         "ratings_estimated": duty.ratings.estimated,
         "ratings_of_makers": list(duty.ratings.makers),
         "two_designs": duty.ratings.two_designs,
-        "L10_Mrev": _finite(duty.basic_life),
-        "L10r_Mrev": _finite(duty.reference_life),
+        "L10_Mrev": finite_or_none(duty.basic_life),
+        "L10r_Mrev": finite_or_none(duty.reference_life),
         "remarks": list(duty.remarks),
     }
 
@@ -286,9 +286,9 @@ def mesh_summary(duty: MeshLoadState) -> dict[str, Any]:
         "misalignment_mrad": 1e3 * duty.misalignment,
         "opening_um": 1e6 * duty.opening,
         "centre_distance_change_um": 1e6 * duty.centre_distance_change,
-        "load_centroid_mm": _finite(1e3 * duty.load_centroid),
-        "K_Hbeta": _finite(duty.face_load_factor),
-        "sigma_H_misaligned_MPa": _finite(1e-6 * duty.pressure),
+        "load_centroid_mm": finite_or_none(1e3 * duty.load_centroid),
+        "K_Hbeta": finite_or_none(duty.face_load_factor),
+        "sigma_H_misaligned_MPa": finite_or_none(1e-6 * duty.pressure),
         "remark": duty.remark,
     }
 
@@ -315,7 +315,8 @@ def read_duties(path: Path) -> dict[str, Any]:
     raise FileError(f"{path}: was written by another version; run exugear bearings again")
 
 
-def _finite(value: float) -> float | None:
+def finite_or_none(value: float) -> float | None:
+    """Return a number for JSON, which has none that is not finite."""
     return value if math.isfinite(value) else None
 
 

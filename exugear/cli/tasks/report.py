@@ -19,14 +19,14 @@ from exugear.cli.console import (
 from exugear.cli.resonances import highest_resonance, resonance_table
 from exugear.cli.tables import Column, Outcome, Table
 from exugear.cli.watched import WatchedProject
-from exugear.gearbox.choice import Choice
+from exugear.gearbox.choice import Choice, choice_of
 from exugear.gearbox.named_files import Permissions
 from exugear.gearbox.reading import GearboxFileError, read_toml
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.project import default_folder, results_folder
 from exugear.report.design_study import at_load
-from exugear.report.findings.context import ReportError, choice_of
+from exugear.report.findings.context import ReportError
 from exugear.report.findings.design_changes import LEAST_DB, DesignStudy, settings_of_study
 from exugear.report.findings.other_design import check_ranges
 from exugear.report.findings.words import QUANTITIES

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
@@ -22,6 +21,7 @@ from exugear.project import Project
 from exugear.report.findings.context import METHOD_LABELS
 from exugear.report.findings.ranking import Ranking, ranking_of
 from exugear.results.findings import Finding
+from exugear.results.folder import finite_or_none
 from exugear.results.sound.over_speed import sound_over_speed
 from exugear.results.sound.radiated_power import radiating_names
 from exugear.steady.findings import LEAST_AMPLITUDE, is_excited, response_findings, shuttling_findings
@@ -144,7 +144,7 @@ def summarise(
         "excited": excited,
         "harmonics": int(data.attrs["harmonics"]),
         "truncation_of_compliance": {str(wave): float(share) for wave, share in shares if " " not in str(wave)},
-        "change_with_more_harmonics": _known(float(data.attrs["change_with_more"])),
+        "change_with_more_harmonics": finite_or_none(float(data.attrs["change_with_more"])),
         "meshes_that_pull": [
             {"mesh": pull.mesh, "speeds": pull.count, "worst_speed_rpm": pull.speed / RPM, "share_of_time": pull.share}
             for pull in (() if law.loses_contact else pulls(data))
@@ -213,10 +213,6 @@ def _sound(data: xr.Dataset, ranking: Ranking) -> dict[str, Any] | None:
     """Return the loudest speed among those that are ranked; None without an elastic housing."""
     sound = sound_over_speed(data)
     return None if sound is None else sound.inside(ranking.speeds).summary()
-
-
-def _known(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def _other_loads(gearbox: Gearbox) -> Iterator[Finding]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from exugear.gearbox.choice import Choice
+from exugear.gearbox.choice import Choice, choice_of
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.variant import Variant, VariantError
@@ -48,11 +48,6 @@ VISIBLE_SHARE = 0.01
 """Minimum TE participation (fraction) of a mode that counts as visible in the overall TE."""
 
 
-def choice_of(attributes: Mapping[str, Any]) -> Choice:
-    """Return the model settings that a run or modes file was computed with, from its attributes, without load case."""
-    return Choice(*(str(attributes[key]) for key in ("variant", "mesh_model", "inertias")))
-
-
 MESH_MODEL_LABELS = {
     "kinematic": "kinematic constraint",
     "constant": "mean mesh stiffness",
@@ -74,6 +69,11 @@ def model_label(choice: Choice) -> str:
     """Return model settings as text for headings."""
     label = Variant.of(choice.variant).label
     return f"{choice.variant} ({label}), {MESH_MODEL_LABELS[choice.mesh_model]}, inertia set {choice.inertias}"
+
+
+def response_label(data: xr.Dataset) -> str:
+    """Return model settings and method of a steady-state response as text for headings."""
+    return f"{model_label(choice_of(data.attrs))}, {METHOD_LABELS[str(data.attrs['method'])]}"
 
 
 class ReportError(ValueError):

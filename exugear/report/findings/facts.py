@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from exugear.gearbox.choice import choice_of
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
-from exugear.report.findings.context import REFERENCE_VARIANT, Context, choice_of
+from exugear.report.findings.context import REFERENCE_VARIANT, Context
 from exugear.report.findings.groups import RankedResonance, RunGroup
 from exugear.report.findings.headline import headline_of_group
 from exugear.report.findings.parameter_variations import BestChange, ModelVariations, best_change

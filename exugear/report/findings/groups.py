@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from exugear.gearbox.choice import Choice
+from exugear.gearbox.choice import Choice, choice_of
 from exugear.gearbox.load_cases import operating_range
 from exugear.gearbox.variant import OFFERED, Variant
 from exugear.report.findings.context import (
@@ -26,7 +26,6 @@ from exugear.report.findings.context import (
     REFERENCE_VARIANT,
     Context,
     StoredResults,
-    choice_of,
     run_key,
 )
 from exugear.report.findings.ranking import (

@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from exugear.gearbox.choice import Choice
+from exugear.gearbox.choice import Choice, choice_of
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.units import RPM
-from exugear.report.findings.context import choice_of
 from exugear.results.findings import Finding
 from exugear.results.spectra.line_spectra import LineSpectra, line_spectra
 from exugear.results.spectra.waterfall import OrderLine

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from exugear.gearbox.choice import choice_of
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.life.life import LEAST_OUTSIDE
 from exugear.life.life_file import draw_life, limits
-from exugear.report.findings.context import METHOD_LABELS, choice_of, model_label
+from exugear.report.findings.context import model_label, response_label
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.words import figure_text
 from exugear.report.pictures.png import png_address
@@ -175,10 +176,7 @@ def _accelerations(material: ReportData, data: xr.Dataset) -> dict[str, Any] | N
                 "frequency / Hz": Cell(f"{orders[line] * speed / (2.0 * np.pi):.0f}"),
             }
         )
-    title = (
-        f"Accelerations at bearings and mounts: steady-state response of {model_label(choice_of(data.attrs))}, "
-        f"{METHOD_LABELS[str(data.attrs['method'])]}"
-    )
+    title = f"Accelerations at bearings and mounts: steady-state response of {response_label(data)}"
     name = f"seats-{model_name(choice_of(data.attrs))}-{data.attrs['method']}"
     table = Table(rows, ("at", "order"), caption=title, name=name, sortable=True)
     return {"model": model_name(choice_of(data.attrs)), "title": title, "table": table}

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from exugear.gearbox.choice import choice_of
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
-from exugear.report.findings.context import OTHER_INPUT, Context, choice_of, model_label, shown_path
+from exugear.report.findings.context import OTHER_INPUT, Context, model_label, shown_path
 from exugear.report.findings.design_changes import (
     LEAST_DB,
     ChangeResult,

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from exugear.gearbox.choice import choice_of
 from exugear.gearbox.units import RPM
-from exugear.report.findings.context import choice_of, model_label
+from exugear.report.findings.context import model_label
 from exugear.report.sections.material import ChartAxis, Curve, ReportData, model_name
 from exugear.report.web.html import Cell, Figure, Table
 from exugear.steady.evaluation.measured_comparison import DRAWN_RANGE, DRAWN_UNITS

@@ -12,16 +12,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from exugear.gearbox.choice import Choice
+from exugear.gearbox.choice import Choice, choice_of
 from exugear.gearbox.load_cases import static_load_in_words
 from exugear.gearbox.units import RPM
 from exugear.report.findings.context import (
     MESH_MODEL_LABELS,
-    METHOD_LABELS,
     REFERENCE_VARIANT,
     VISIBLE_SHARE,
-    choice_of,
     model_label,
+    response_label,
 )
 from exugear.report.findings.facts import facts_of
 from exugear.report.findings.groups import RunGroup
@@ -234,7 +233,7 @@ def _exudyn_comparison(material: ReportData, run: VariantRun) -> Figure | None:
 def _response_row(data: xr.Dataset) -> dict[str, object]:
     speed = np.abs(data["speed"].to_numpy()) / RPM
     return {
-        "steady-state response": f"{model_label(choice_of(data.attrs))}, {METHOD_LABELS[str(data.attrs['method'])]}",
+        "steady-state response": response_label(data),
         "speeds": data.sizes["point"],
         "lowest speed / rpm": f"{speed.min():.1f}",
         "highest speed / rpm": f"{speed.max():.1f}",
@@ -283,8 +282,7 @@ def _hashes(material: ReportData) -> list[dict[str, str]]:
     hashes = {f"table {name}": table.input_hash for name, table in results.tables.items()}
     hashes |= {str(context.name_of(run.path)): run.attributes["input_hash"] for run in results.runs}
     for data in results.steady:
-        method = METHOD_LABELS[str(data.attrs["method"])]
-        hashes[f"steady-state response {model_label(choice_of(data.attrs))}, {method}"] = data.attrs["input_hash"]
+        hashes[f"steady-state response {response_label(data)}"] = data.attrs["input_hash"]
     hashes |= {f"modes {model_label(model)}": data.attrs["input_hash"] for model, data in results.modes.items()}
     return [{"result": name, "SHA-256 of its input": sha256} for name, sha256 in hashes.items()]
 

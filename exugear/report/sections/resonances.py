@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from exugear.gearbox.choice import Choice
+from exugear.gearbox.choice import Choice, choice_of
 from exugear.gearbox.load_cases import static_load_in_words, summarise_loads
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.sections.entries import GROUND
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
-from exugear.report.findings.context import METHOD_LABELS, Context, choice_of, model_label
+from exugear.report.findings.context import Context, model_label, response_label
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.headline import Headline
 from exugear.report.findings.ranking import HOUSING, SHAFTS, Ranking, Resonance, is_over_speed
@@ -387,7 +387,7 @@ def _response(material: ReportData, data: xr.Dataset) -> dict[str, Any]:
     choice = choice_of(data.attrs)
     level = str(data.attrs["method"])
     runs = [run for run in material.results.runs if choice_of(run.attributes) == choice]
-    label = f"{model_label(choice)}, {METHOD_LABELS[level]}"
+    label = response_label(data)
     context.tell(f"steady-state response, {label}")
     found = peaks(data)[:PEAKS]
     rates = {str(run.attributes["load_case"]): _unit_rate(run) for run in runs}
