@@ -235,13 +235,7 @@ def open_project(
     load_case: str | None = None,
     without: Sequence[str] = (),
 ) -> WatchedProject:
-    """Read a gearbox file and raise an error for invalid or unavailable model settings; write no files.
-
-    Parameters
-    ----------
-    variant : by default the usual one of the gearbox
-    without : names of excitations that are left out
-    """
+    """Read a gearbox file without some excitations, and refuse invalid or unavailable settings; write no files."""
     gearbox = read_gearbox(case, allow_dir, scripts)
     for name in without:
         if name not in gearbox.case.excitations:

@@ -571,12 +571,7 @@ def _wrench(section: ExcitationSection, n: int, share: float) -> tuple[complex, 
 
 
 def couplings(origin: Origin, spinning: Sequence[str], bearing_names: Sequence[str]) -> tuple[Coupling, ...]:
-    """Torsional springs between rotating bodies.
-
-    Parameters
-    ----------
-    spinning : names of the bodies that can rotate
-    bearing_names : names of all bearings, which a coupling may refer to as its seat
+    """Torsional springs between rotating bodies; a bearing may be the seat of one.
 
     Raises
     ------

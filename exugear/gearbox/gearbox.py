@@ -189,14 +189,9 @@ class Gearbox(ReprMixin):
             )
 
     def write_copy(self, path: Path, numbers: Mapping[str, float]) -> None:
-        """Write a copy of the gearbox file with some numbers replaced; comments, order and spacing are kept.
+        """Write a copy of the file into its folder, with numbers replaced by dotted key; comments and spacing are kept.
 
         The copy is checked before it is written, and written whole or not at all.
-
-        Parameters
-        ----------
-        path : new file in the folder of the gearbox file
-        numbers : values by dotted key, such as ``housing.factor``
 
         Raises
         ------

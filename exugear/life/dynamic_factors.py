@@ -78,12 +78,7 @@ def stated_factors(gearbox: Gearbox, value: float) -> dict[str, DynamicFactor]:
 
 
 def factors_of_run(assembly: Assembly, rating: RatingSection, path: Path, body: str) -> dict[str, DynamicFactor]:
-    """Return the factors of mesh families over the speed of a body, from a run of the same variant.
-
-    Parameters
-    ----------
-    rating : with the load case of the run, and the minimum factor
-    body : loaded body, whose speed counts
+    """Return the factors of mesh families over the speed of the loaded body, from a run of the same variant.
 
     Raises
     ------
@@ -199,12 +194,7 @@ def _choice(assembly: Assembly, load_case: str | None = None) -> Choice:
 
 
 def factors_of_response(assembly: Assembly, rating: RatingSection, path: Path, body: str) -> dict[str, DynamicFactor]:
-    """Return the factors of mesh families over the speed of a body, from a steady-state response of the same variant.
-
-    Parameters
-    ----------
-    rating : with the method of the response, and the minimum factor
-    body : loaded body, whose speed counts
+    """Return the factors of mesh families over the speed of the loaded body, from a steady-state response.
 
     Raises
     ------

@@ -187,13 +187,7 @@ def flank_lives(
     stresses: Mapping[str, MeshCycleStress],
     dynamic: Mapping[str, DynamicFactor],
 ) -> tuple[FlankLife, ...]:
-    """Rate all gears of pairs with known stresses.
-
-    Parameters
-    ----------
-    stresses : by pair name
-    dynamic : by mesh family
-    """
+    """Rate all gears of pairs with known stresses, by pair name, with K_v by mesh family."""
     pairs = {mesh.family: mesh.pair for mesh in gearbox.meshes}
     lives: dict[tuple[str, str, str], list[FlankLife]] = {}
     for tooth in teeth:

@@ -96,13 +96,7 @@ def label(life: FlankLife, holder: str) -> str:
 def shortfalls(
     rating: RatingSection, flanks: Iterable[FlankLife], bearings: Iterable[BearingLife], hours: float
 ) -> Iterator[str]:
-    """Report parts below the required safety, over the life or under the largest load, or below the required life.
-
-    Parameters
-    ----------
-    rating : its `minimum_S_H`, `minimum_S_F` and `minimum_S_0`
-    hours : of operation in the life
-    """
+    """Report parts below the required safety, over the life or under the largest load, or below the required life."""
     for flank in flanks:
         of_flank = (flank.contact_safety, flank.contact_static)
         of_root = (flank.root_safety, flank.root_static)
@@ -257,13 +251,7 @@ def check_keys(gearbox: Gearbox) -> None:
 
 
 def life_hash(assembly: Assembly, counted: CountedLoads, tables: Mapping[str, str], run: str = "") -> str:
-    """Return the SHA-256 of all input of a rating.
-
-    Parameters
-    ----------
-    tables : by pair name, hashes of the tables' inputs
-    run : input hash of the run or steady-state response for K_v
-    """
+    """Return the SHA-256 of all input of a rating, with hashes of the inputs of its tables (by pair) and run."""
     case = assembly.gearbox.content
     content = {
         "method_version": LIFE,

@@ -57,11 +57,7 @@ def _checksum(kept: dict[str, Any]) -> str:
 
 
 def read_stored_gearbox(folder: Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:
-    """Read the gearbox that the results in a folder belong to.
-
-    Parameters
-    ----------
-    permissions : in which other folder files named in the gearbox file may lie
+    """Read the gearbox of the results in a folder; the permissions are for the files that it names.
 
     Raises
     ------

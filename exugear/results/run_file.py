@@ -453,11 +453,7 @@ def load_run(path: str | Path, names: Iterable[str] | None = None) -> xr.Dataset
 
 
 def read_run(path: Path, names: Iterable[str]) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-    """Read some variables and the attributes of a run, without labels; this avoids the import time of xarray.
-
-    Parameters
-    ----------
-    path : ``run.nc``, or the folder ``run.partial`` of a run that was stopped
+    """Read some variables and the attributes of a run or of its pieces, without labels and the import of xarray.
 
     Raises
     ------

@@ -261,11 +261,6 @@ def optimise(
 ) -> StudyResult:
     """Optimise the parameters of a study with a section ``optimise``.
 
-    Parameters
-    ----------
-    opens : callable, optional
-        Starts workers; processes on all cores by default.
-
     Returns
     -------
     StudyResult

@@ -58,13 +58,7 @@ class RefusedError(Exception):
 
 
 class EditServer(ThreadingHTTPServer):
-    """Server of one gearbox file, on this machine only.
-
-    Parameters
-    ----------
-    allow_dir : another folder whose files the gearbox file may name
-    port : 0 for any free port
-    """
+    """Server of one gearbox file, on this machine only; port 0 is any free one."""
 
     daemon_threads = True
     request_queue_size = 128

@@ -84,13 +84,7 @@ class CheckedText:
 
 
 class Analyst:
-    """Results of texts of one gearbox file; results of the last texts are kept.
-
-    Parameters
-    ----------
-    source : path of the file, for messages and for the files that it names
-    permissions : of the file; scripts are never run
-    """
+    """Results of texts of one gearbox file, whose scripts are never run; results of the last texts are kept."""
 
     def __init__(self, source: str | Path, permissions: Permissions = NOTHING_MORE) -> None:
         self._source = str(source)

@@ -186,13 +186,7 @@ def _simulate(project: Project, resume: bool, command: str, **options: Any) -> R
 def _outcome(
     case: str, finished: Run, comparison: SolverComparison | None, command: str, said: Collection[str]
 ) -> Outcome:
-    """Return what is printed of a run; end with code 130 if the user stopped it.
-
-    Parameters
-    ----------
-    command : resumes the run
-    said : warnings that were printed before it
-    """
+    """Return what is printed of a run, but for warnings that were said before; end with code 130 if it was stopped."""
     if not finished.complete and not finished.halted:
         so_far = "".join(f"\nInvalid so far: {reason}" for reason in finished.reasons)
         raise StoppedError(

@@ -152,12 +152,7 @@ def load_points(
 
 
 def equivalent_load(load: Floats, cycles: Floats, exponent: float) -> float:
-    """Return the constant load with the same damage in the same number of cycles, by Miner's rule with one slope.
-
-    Parameters
-    ----------
-    load : the absolute value is taken
-    exponent : slope of the S-N curve
+    """Return the constant load of equal damage in as many cycles as absolute loads, by Miner's rule with one slope.
 
     Examples
     --------

@@ -337,13 +337,7 @@ def nominal_load_values(
     balance: StaticBalance,
     stresses: Mapping[str, MeshCycleStress],
 ) -> dict[FlankKey, dict[str, float]]:
-    """Return the values of the flanks of pairs with stresses under the nominal load, with K_A applied to its torque.
-
-    Parameters
-    ----------
-    counted : the nominal load times K_A
-    stresses : by pair name
-    """
+    """Return the values of the flanks of pairs with stresses under the nominal load, with K_A applied to its torque."""
     dynamic = stated_factors(gearbox, rating.dynamic_factor or rating.minimum_dynamic_factor or 1.0)
     lives = flank_lives(gearbox, rating, counted.teeth, acting_loads(counted), balance, stresses, dynamic)
     return {

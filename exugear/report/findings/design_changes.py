@@ -324,12 +324,7 @@ def objection_to(effects: Mapping[str, Effect], quantity: str, labels: Mapping[s
 
 
 def price_of(before: Gearbox, after: Gearbox, nominal: bool = True) -> str:
-    """Differences of speed ratio, mass, axial force and nominal contact stress of gears, as text.
-
-    Parameters
-    ----------
-    nominal : whether to list the nominal contact stress, for gearboxes without a load spectrum
-    """
+    """Differences of ratio, mass, axial force and, if `nominal`, nominal contact stress of gears, as text."""
     costs = []
     if abs(after.train.ratio / before.train.ratio - 1.0) > 1e-6:
         costs.append(f"speed ratio {before.train.ratio:.4g} to {after.train.ratio:.4g}")

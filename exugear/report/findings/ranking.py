@@ -196,12 +196,7 @@ class Ranking:
 
 
 def deciding_quantity(available: Collection[str], wanted: str | None) -> tuple[str, str]:
-    """Return the quantity that decides the order of a ranking, and the reason as text.
-
-    Parameters
-    ----------
-    available : quantities of a response
-    wanted : name as in `DECIDING`; None for the default
+    """Return the quantity that decides a ranking, the one wanted in `DECIDING` or the default, and the reason as text.
 
     Examples
     --------

@@ -122,11 +122,7 @@ def draw_gearbox(
     title: str = "",
     size: tuple[int, int] = (1600, 1200),
 ) -> Figure:
-    """Draw the bodies of a gearbox, each in its colour.
-
-    Parameters
-    ----------
-    size : width and height of the rendered image, pixels
+    """Draw the bodies of a gearbox, each in its colour; the rendered image has a size in pixels.
 
     Raises
     ------
@@ -153,11 +149,7 @@ def draw_gearbox(
 
 
 def draw_mode(scene: ModeScene, path: str | Path | None = None, *, size: tuple[int, int] = (1600, 1200)) -> Figure:
-    """Draw a mode or an operating deflection shape at its maximum deflection, coloured by displacement.
-
-    Parameters
-    ----------
-    size : width and height of the rendered image, pixels
+    """Draw a mode or operating deflection shape at its maximum, coloured by displacement; the size is in pixels.
 
     Raises
     ------
@@ -408,10 +400,6 @@ def draw_elastic_bodies(
     scene: ElasticScene, path: str | Path | None = None, *, size: tuple[int, int] = (1600, 1200)
 ) -> Figure:
     """Draw flexible bodies at maximum deflection, coloured by strain energy density; gears are translucent.
-
-    Parameters
-    ----------
-    size : width and height of the rendered image, pixels
 
     Raises
     ------

@@ -305,7 +305,6 @@ def displacement_of(body: BodyShape, motion: ArrayLike) -> Floats:
 
     Parameters
     ----------
-    body : the body, n points
     motion : (6,) displacement (m) of the reference point and rotations (rad) about x, y, z
     """
     return np.asarray(_displaced(body, np.asarray(motion, dtype=np.float64)))
@@ -370,7 +369,6 @@ def placed(body: BodyShape, motion: ArrayLike) -> Floats:
 
     Parameters
     ----------
-    body : the body, n points
     motion : (6,) as in `displacement_of`, the rotations as a rotation vector
     """
     matrix = motion_matrix(body.reference, motion)

@@ -79,15 +79,10 @@ class ShaftAngle(ReprMixin):
 
 
 def pulse_times(values: Floats, rate: float) -> Floats:
-    """Find the times of the rising edges of a tacho signal, s, linear between samples.
+    """Find the times (s) of rising edges of a tacho signal (n,), linear between samples; the rate is in Hz.
 
     The trigger level is halfway between low and high. Pulses may cover any part of a revolution, as long as every
     fiftieth part of the signal has one.
-
-    Parameters
-    ----------
-    values : (n,) tacho signal in any unit
-    rate : sampling rate, Hz
 
     Raises
     ------
@@ -283,16 +278,11 @@ def _values_and_slopes(spline: BSpline, at: Floats) -> tuple[Floats, Floats]:
 
 
 def angle_of_speed(speed: Floats, rate: float) -> ShaftAngle:
-    """Angle of a shaft from a speed signal, by integration.
+    """Angle of a shaft from a speed signal (n,), rad/s in either sense, by integration; the rate is in Hz.
 
     An error e of the speed shifts the phase of order n by 2 pi n R e within R revolutions: for levels within 0.2 dB
     under a Hann window, n R e must be below 0.18. A signal that is 0.1 % wrong is good for orders up to 22 with eight
     revolutions.
-
-    Parameters
-    ----------
-    speed : (n,) rad/s, in either sense
-    rate : sampling rate, Hz
 
     Returns
     -------

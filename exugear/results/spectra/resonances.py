@@ -175,12 +175,7 @@ def _are_indistinct(first: Pick, second: Pick) -> bool:
 def match_eigenfrequencies(
     resonances: Sequence[Pick | WaterfallResonance], eigenfrequencies: ArrayLike
 ) -> tuple[int | None, ...]:
-    """Assign an eigenfrequency to each resonance.
-
-    Parameters
-    ----------
-    resonances : peaks or resonances of a waterfall
-    eigenfrequencies : (n,) Hz
+    """Assign an eigenfrequency, of (n,) in Hz, to each peak or resonance of a waterfall.
 
     Returns
     -------
@@ -298,12 +293,7 @@ FEWEST_SAMPLES = 16
 
 
 def sweep_severity(frequency: float, damping: float, rate: float) -> float:
-    """Sweep-rate ratio, which compares the sweep rate with the build-up of a resonance: f' / (2 pi zeta^2 f^2).
-
-    Parameters
-    ----------
-    frequency : frequency of the resonance, Hz
-    rate : sweep rate, Hz/s
+    """Sweep-rate ratio, of a sweep rate (Hz/s) to the build-up of a resonance at f (Hz): f' / (2 pi zeta^2 f^2).
 
     Examples
     --------

@@ -311,12 +311,7 @@ class AbsenceRule:
 
 
 def only_in_first(picks: Iterable[Pick], other: Waterfall, rule: AbsenceRule | None = None) -> tuple[Pick, ...]:
-    """Select the peaks of one run that are absent from another run.
-
-    Parameters
-    ----------
-    other : spectra of the second run, in the same unit
-    rule : thresholds; default: those of `AbsenceRule`
+    """Select the peaks of one run that are absent from another run, by the thresholds of a rule.
 
     Returns
     -------

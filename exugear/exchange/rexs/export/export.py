@@ -166,12 +166,7 @@ class Results(ReprMixin, line=": {additions!n} attributes"):
     def put(
         self, component: int, key: str, value: ArrayLike | None, load_case: int | None = None, own: bool = False
     ) -> None:
-        """Add a result in SI (key of `RESULTS`) under its name in the version, or a custom one; None is skipped.
-
-        Parameters
-        ----------
-        own : whether the name is a custom one although REXS has one
-        """
+        """Add a result in SI (key of `RESULTS`) under its name in the version, or its `own` name; None is skipped."""
         if value is None:
             return
         unit = RESULTS[key].unit

@@ -266,12 +266,7 @@ class Imported(ReprMixin, line=" {gearbox!r}: {changed!n} assumptions, {ignored!
 
 
 def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules: Rules | None = None) -> Imported:
-    """Convert a REXS model to a gearbox file and check it.
-
-    Parameters
-    ----------
-    source : name of the REXS file, for the comments
-    path : intended path of the gearbox file, for messages
+    """Convert a REXS model to a gearbox file and check it; comments name the `source`, messages the `path`.
 
     Raises
     ------
