@@ -220,7 +220,10 @@ def _outcome(folder: Path, written: Report, study: DesignStudy | None) -> Outcom
     findings += [Finding("warning", f"skipped: {line}") for line in written.left_out]
     if study is not None:
         tables.insert(0, _changes(study))
-        findings += _unmet(study)
+    if study is not None and study.requirements:
+        more = f"; and {len(study.requirements) - 1} more" if len(study.requirements) > 1 else ""
+        text = f"requirements that the unchanged gearbox does not meet: {study.requirements[0]}{more}"
+        findings.append(Finding("warning", text))
     checks = {f"{finding.line}." for finding in written.findings}
     return Outcome(
         verdict=verdict,
@@ -266,15 +269,6 @@ def _changes(study: DesignStudy) -> Table:
     title += f", {study.line}, dB; loads: {', '.join(study.loads)}"
     legend = "here: this peak; range: highest amplitude of any order. Rated: changes that are recommended otherwise."
     return Table(title, rows, columns, legend, noun="changes")
-
-
-def _unmet(study: DesignStudy) -> list[Finding]:
-    """Return a warning about requirements that the unchanged gearbox does not meet."""
-    if not study.requirements:
-        return []
-    more = f"; and {len(study.requirements) - 1} more" if len(study.requirements) > 1 else ""
-    text = f"requirements that the unchanged gearbox does not meet: {study.requirements[0]}{more}"
-    return [Finding("warning", text)]
 
 
 def _decibels(value: float) -> str:

@@ -24,7 +24,7 @@ from exugear.report.findings.design_changes import (
 from exugear.report.findings.facts import best_words, sensitivities_of, shift_text
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.headline import Headline, headline_of_group
-from exugear.report.findings.other_design import Difference, HighestAmplitude, change_in_decibels, highest_within
+from exugear.report.findings.other_design import HighestAmplitude, change_in_decibels, highest_within
 from exugear.report.findings.parameter_variations import best_change, track_mode
 from exugear.report.findings.proposals import ASSUMPTION
 from exugear.report.findings.ranking import Envelope
@@ -191,7 +191,10 @@ def _compared(material: ReportData) -> dict[str, Any] | None:
         "amplitudes": Table(rows, caption="Two designs", name="two-designs-table"),
         "figures": figures,
         "keys": Table(
-            [_key_row(this, other.name, difference) for difference in other.differences[:SHOWN_KEYS]],
+            [
+                {"key": one.key, this: _value_text(one.own), other.name: _value_text(one.other)}
+                for one in other.differences[:SHOWN_KEYS]
+            ],
             (this, other.name),
             caption="Keys that differ",
             name="two-designs-keys",
@@ -236,11 +239,6 @@ def _number(value: float, form: str = "") -> Cell:
     if math.isnan(value):
         return Cell("–", value)
     return Cell((format(value, form) if form else rounded_text(value)).replace("-", "−"), value)
-
-
-def _key_row(this: str, other: str, difference: Difference) -> dict[str, Any]:
-    values = map(_value_text, (difference.own, difference.other))
-    return {"key": difference.key, **dict(zip((this, other), values, strict=True))}
 
 
 def _value_text(value: Any) -> str:
