@@ -61,7 +61,9 @@ def check_allow_dir(folder: Path | None) -> None:
 
 
 def assembled_by_iso(gearbox: Gearbox, variant: Variant, like: Assembly | None = None) -> Assembly:
-    """Assemble a variant with rigid bodies and mesh stiffness to ISO 6336-1; one `like` it shortens the search.
+    """Assemble a variant with rigid bodies and the mesh stiffness of ISO 6336-1, which requires no finite elements.
+
+    An assembly of a similar gearbox, `like`, shortens the search for the static state.
 
     Raises
     ------

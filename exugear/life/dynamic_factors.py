@@ -194,7 +194,7 @@ def _choice(assembly: Assembly, load_case: str | None = None) -> Choice:
 
 
 def factors_of_response(assembly: Assembly, rating: RatingSection, path: Path, body: str) -> dict[str, DynamicFactor]:
-    """Return the factors of mesh families over the speed of the loaded body, from a steady-state response.
+    """Return the factors of mesh families over the speed of the loaded body, from a response of the same variant.
 
     Raises
     ------
