@@ -63,9 +63,7 @@ def check_allow_dir(folder: Path | None) -> None:
 def assembled_by_iso(gearbox: Gearbox, variant: Variant, like: Assembly | None = None) -> Assembly:
     """Assemble a variant with rigid bodies and the mesh stiffness of ISO 6336-1, which requires no finite elements.
 
-    Parameters
-    ----------
-    like : assembly of a similar gearbox, for a shorter search for the static state
+    An assembly of a similar gearbox, `like`, shortens the search for the static state.
 
     Raises
     ------

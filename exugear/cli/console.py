@@ -73,9 +73,7 @@ def shortened(line: str) -> str:
     'xxxx must be shorter'
     """
     half = (LONGEST_LINE - 3) // 2
-    if len(line) <= LONGEST_LINE:
-        return line
-    return f"{line[:half]}...{line[-half:]}"
+    return line if len(line) <= LONGEST_LINE else f"{line[:half]}...{line[-half:]}"
 
 
 def say(line: str) -> None:
@@ -122,9 +120,7 @@ def counted(lines: list[str], most: int = MOST_LINES) -> list[str]:
     >>> len(shown), shown[-1]
     (25, 'and 26 more')
     """
-    if len(lines) <= most:
-        return lines
-    return [*lines[: most - 1], f"and {len(lines) - most + 1} more"]
+    return lines if len(lines) <= most else [*lines[: most - 1], f"and {len(lines) - most + 1} more"]
 
 
 class _Description(ProgressColumn):
@@ -295,7 +291,9 @@ def exit_codes() -> Iterator[None]:
     except KeyboardInterrupt:
         end_with("Stopped", "finished results are kept; run the same command to resume", EXIT_INTERRUPTED)
     except OSError as error:
-        end_with("Failed", _file_error_text(error), EXIT_FAILED)
+        # A message of the program itself already names the file.
+        reason = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error)
+        end_with("Failed", reason, EXIT_FAILED)
     except MemoryError as error:
         end_with("Failed", f"out of memory ({error})" if str(error) else "out of memory", EXIT_FAILED)
     except Exception as error:
@@ -306,13 +304,6 @@ def exit_codes() -> Iterator[None]:
             raise
         text = f"{folder}: compiled kernels were damaged and have been removed; run the same command again"
         end_with("Failed", text, EXIT_FAILED)
-
-
-def _file_error_text(error: OSError) -> str:
-    """File and reason of an error; a message of the program itself already names the file."""
-    if error.filename and error.strerror:
-        return f"{error.filename}: {error.strerror}"
-    return str(error)
 
 
 def end_with(what: str, reason: object, code: int) -> NoReturn:

@@ -122,8 +122,6 @@ def _factor(row: tuple[str, str, str]) -> str:
 
 
 def _column(flank: FlankSheet) -> Column:
-    """Return the column of a gear."""
-
     def shown(row: tuple[str, str, str]) -> str:
         _, name, part = row
         form = ".4g" if name == "N_L" else _DIGITS.get(UNITS.get(name, ""), ".3f")

@@ -13,7 +13,6 @@ from exugear.gearbox.load_cases import static_load_in_words
 from exugear.gearbox.units import RPM
 from exugear.report.findings.ranking import UNIT_KEYS, Ranking
 from exugear.report.findings.words import QUANTITIES, Labels
-from exugear.steady.peaks import line_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -54,10 +53,9 @@ def source_table(gearbox: Gearbox, data: xr.Dataset) -> Table | None:
     peaks = json.loads(data.attrs["contributions"])
     if not gearbox.varying_loads or not peaks:
         return None
-    bases = tuple(str(name) for name in data["base"].to_numpy())
     rows = []
     for peak in peaks:
-        name = line_name(tuple(data["index"].to_numpy()[peak["line"]].tolist()), bases)
+        name = str(data["line"][peak["line"]].item())
         shares = sorted(peak["meshes"].items(), key=lambda own: -abs(own[1]))
         listed = [f"{source} {100.0 * share:.0f} %" for source, share in shares if abs(share) >= LEAST_SOURCE]
         rows.append({"line": name, "speed_rpm": peak["speed"] / RPM, "from": ", ".join(listed) or "-"})
@@ -72,12 +70,7 @@ def _speeds(ranking: Ranking) -> str:
 
 
 def resonance_table(gearbox: Gearbox, ranking: Ranking, model: str) -> Table:
-    """Return the table of a ranking: the quantity that decides first, with its range over the damping.
-
-    Parameters
-    ----------
-    model : what the ranking is of, as text
-    """
+    """Return the table of the ranking of a model: the quantity that decides first, with its range over the damping."""
     resonances = [resonance.summary() for resonance in ranking.resonances]
     first, body = ranking.quantity, gearbox.case.overall.input
     where = "all speeds" if ranking.whole else "operating range"

@@ -14,11 +14,7 @@ LEGEND = "Equivalent radiated power of the outer surface, dB re 1 pW: an upper e
 
 
 def sound_line(sound: Mapping[str, Any]) -> str:
-    """Return the loudest speed in one line.
-
-    Parameters
-    ----------
-    sound : as `exugear.results.sound.over_speed.SoundOverSpeed.summary` makes it
+    """Return the loudest speed of a summary of `SoundOverSpeed` in one line.
 
     Examples
     --------

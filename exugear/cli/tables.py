@@ -111,7 +111,6 @@ class Table:
     columns: Sequence[Column]
     """The first one is text; numbers are never wrapped or truncated."""
     legend: str = ""
-    """Text below the table."""
     details: str = ""
     """Continuation of the legend with ``--all``."""
     noun: str = "rows"

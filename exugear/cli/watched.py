@@ -13,7 +13,6 @@ from exugear.cli.case import check_choice, read_gearbox
 from exugear.cli.console import BadInputError, FailedError, check_results_folder, make_results_folder, note, warn
 from exugear.cli.options import VARIANT_DESCRIPTIONS
 from exugear.gearbox.choice import Choice
-from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.variant import Variant
 from exugear.project import Project, results_folder
@@ -236,33 +235,19 @@ def open_project(
     load_case: str | None = None,
     without: Sequence[str] = (),
 ) -> WatchedProject:
-    """Read a gearbox file and raise an error for invalid or unavailable model settings; write no files.
-
-    Parameters
-    ----------
-    variant : by default the usual one of the gearbox
-    without : names of excitations that are left out
-    """
-    gearbox = _without(read_gearbox(case, allow_dir, scripts), without)
-    choice = Choice(variant or _chosen_variant(gearbox), str(mesh_model), inertias, load_case)
+    """Read a gearbox file without some excitations, and refuse invalid or unavailable settings; write no files."""
+    gearbox = read_gearbox(case, allow_dir, scripts)
+    for name in without:
+        if name not in gearbox.case.excitations:
+            known = ", ".join(gearbox.case.excitations) or "none in the file"
+            raise BadInputError(f"--without {name}: no such excitation; choose one of: {known}")
+    gearbox = gearbox.varied({f"excitations.{name}.enabled": False for name in without}) if without else gearbox
+    if variant is None:
+        variant = usual_variant(gearbox)
+        if reason := lacking(gearbox, Variant.bushing):
+            note(f"Variant {variant} ({VARIANT_DESCRIPTIONS[variant]}): bushing is not available, {reason}")
+    choice = Choice(variant, str(mesh_model), inertias, load_case)
     folder = results_folder(case, out)
     check_choice(gearbox, choice, folder)
     check_results_folder(folder)
     return WatchedProject(gearbox, folder, choice)
-
-
-def _without(gearbox: Gearbox, names: Sequence[str]) -> Gearbox:
-    """Leave out excitations by their names."""
-    for name in names:
-        if name not in gearbox.case.excitations:
-            known = ", ".join(gearbox.case.excitations) or "none in the file"
-            raise BadInputError(f"--without {name}: no such excitation; choose one of: {known}")
-    return gearbox.varied({f"excitations.{name}.enabled": False for name in names}) if names else gearbox
-
-
-def _chosen_variant(gearbox: Gearbox) -> Variant:
-    """Return the usual variant of a gearbox, and print which one it is if bearings are not available."""
-    variant = usual_variant(gearbox)
-    if reason := lacking(gearbox, Variant.bushing):
-        note(f"Variant {variant} ({VARIANT_DESCRIPTIONS[variant]}): bushing is not available, {reason}")
-    return variant

@@ -85,11 +85,7 @@ class Channels(ReprMixin):
         return np.concatenate([values[:, 0] for _, values in self.blocks([(name, quantity)])])
 
     def blocks(self, wanted: Sequence[tuple[str, str]]) -> Iterator[tuple[Floats, Floats]]:
-        """Yield time (s) and some channels (SI) in blocks, (n,) and (n, channels), so that no whole file is in memory.
-
-        Parameters
-        ----------
-        wanted : name and quantity of each channel, as in `channel`
+        """Yield time (s) and channels by name and quantity (SI) in blocks, (n,) and (n, channels), to save memory.
 
         Raises
         ------
@@ -100,30 +96,24 @@ class Channels(ReprMixin):
         places = tuple(self._place(name) for name, _ in wanted)
         units = [self._unit(place, quantity) for place, (_, quantity) in zip(places, wanted, strict=True)]
         factors = np.array([unit.factor for unit in units])
-        second = self._second()
+        clock = unit_of(self.time_unit.strip("() []") or "s", any_case=True)
+        if clock is None or clock.quantity != "time":
+            raise LoadFileError(f"{self.path}: time has the unit {self.time_unit!r}; expected s, ms, min or h")
         steps = _Steps(self.path)
         for time, values in self.read(places):
-            steps.check(second * time)
+            instants = clock.factor * time
+            steps.check(instants)
             found = values * factors
-            self._check_numbers(found, places, second * time, steps.count - len(time))
-            yield second * time, found
+            bad = np.argwhere(~np.isfinite(found))
+            if bad.size:
+                row, column = bad[0].tolist()
+                raise LoadFileError(
+                    f"{self.path}: channel {self.names[places[column]]} has no number at {instants[row]:g} s (step "
+                    f"{steps.count - len(time) + row + 1}); correct the file"
+                )
+            yield instants, found
         if steps.count < LEAST_LINES:
             raise LoadFileError(f"{self.path}: {steps.count} time steps; at least {LEAST_LINES} are required")
-
-    def _check_numbers(self, values: Floats, places: Sequence[int], time: Floats, before: int) -> None:
-        bad = np.argwhere(~np.isfinite(values))
-        if bad.size:
-            row, column = bad[0].tolist()
-            raise LoadFileError(
-                f"{self.path}: channel {self.names[places[column]]} has no number at {time[row]:g} s (step "
-                f"{before + row + 1}); correct the file"
-            )
-
-    def _second(self) -> float:
-        unit = unit_of(self.time_unit.strip("() []") or "s", any_case=True)
-        if unit is None or unit.quantity != "time":
-            raise LoadFileError(f"{self.path}: time has the unit {self.time_unit!r}; expected s, ms, min or h")
-        return unit.factor
 
     def _unit(self, place: int, quantity: str) -> Unit:
         unit = unit_of(self.units[place], any_case=True)

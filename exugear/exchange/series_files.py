@@ -95,8 +95,6 @@ def numbers(
 
     Parameters
     ----------
-    headings : names of the columns
-    skipped : number of heading lines
     separator : separator of numbers; None for blanks
     wanted : indices of the required columns; all by default
 

@@ -54,10 +54,6 @@ def inertia_sets(origin: Origin) -> tuple[str, ...]:
 def bodies(origin: Origin, inertias: str) -> tuple[Body, ...]:
     """All enabled bodies, with one body per planet.
 
-    Parameters
-    ----------
-    inertias : name of the inertia set
-
     Raises
     ------
     GearboxFileError
@@ -228,10 +224,6 @@ def pin_offsets(origin: Origin, bodies: Mapping[str, Body]) -> dict[str, tuple[f
 
 def load_cases(origin: Origin, spinning: Sequence[str]) -> dict[str, LoadCase]:
     """Load cases by name.
-
-    Parameters
-    ----------
-    spinning : names of the bodies that can rotate
 
     Raises
     ------
@@ -483,7 +475,18 @@ def varying_loads(
             return ()
         loads: list[VaryingLoad] = []
         for body in loaded:
-            _check_load_on(origin, key, section, body)
+            if body.fixed:
+                raise origin.error(f"{key}.body = {section.body!r}: a fixed body has no angle; set a rotating body")
+            if section.z_mm is not None and body.spin_only:
+                raise origin.error(
+                    f"{key}.z_mm: {section.body!r} is a spin-only body, which takes torques only; remove z_mm, forces, "
+                    "moments and unbalance, or give the body a position"
+                )
+            halves = [order for order in section.orders if order * section.pole_pairs % 1.0]
+            if halves and body.carrier is not None:
+                raise origin.error(
+                    f"{key}.orders: {halves[0]:g}: half orders of planets are not supported; set whole numbers"
+                )
             loads += _loads_on(origin, name, section, body, static_torque)
         return tuple(replace(load, reaction_on=reaction_on) for load in loads)
 
@@ -505,20 +508,6 @@ def _reaction_of(origin: Origin, key: str, section: ExcitationSection, bodies: M
     if bodies[name].spin_only and (section.force_N or section.moment_N_m):
         raise origin.error(f"{where}: a spin-only body takes torques only; set a body with a position")
     return name
-
-
-def _check_load_on(origin: Origin, key: str, section: ExcitationSection, body: Body) -> None:
-    """Raise an error for a body that cannot have the load of an excitation."""
-    if body.fixed:
-        raise origin.error(f"{key}.body = {section.body!r}: a fixed body has no angle; set a rotating body")
-    if section.z_mm is not None and body.spin_only:
-        raise origin.error(
-            f"{key}.z_mm: {section.body!r} is a spin-only body, which takes torques only; remove z_mm, forces, moments "
-            "and unbalance, or give the body a position"
-        )
-    halves = [order for order in section.orders if order * section.pole_pairs % 1.0]
-    if halves and body.carrier is not None:
-        raise origin.error(f"{key}.orders: {halves[0]:g}: half orders of planets are not supported; set whole numbers")
 
 
 def _loads_on(
@@ -582,12 +571,7 @@ def _wrench(section: ExcitationSection, n: int, share: float) -> tuple[complex, 
 
 
 def couplings(origin: Origin, spinning: Sequence[str], bearing_names: Sequence[str]) -> tuple[Coupling, ...]:
-    """Torsional springs between rotating bodies.
-
-    Parameters
-    ----------
-    spinning : names of the bodies that can rotate
-    bearing_names : names of all bearings, which a coupling may refer to as its seat
+    """Torsional springs between rotating bodies; a bearing may be the seat of one.
 
     Raises
     ------

@@ -1,8 +1,4 @@
-"""Consistency checks between the parts of a gearbox: masses, positions, assembly of planets, supports.
-
-Each function compares the parts passed to it and yields error texts with the key, its value and the remedy. `CHECKS`
-lists all of them in order.
-"""
+"""Consistency checks between the parts of a gearbox: masses, positions, assembly of planets, supports."""
 
 from __future__ import annotations
 
@@ -67,7 +63,16 @@ def errors_of_bodies(case: GearboxFile) -> Iterator[str]:
                 known = known_names("gears", case.gears, f"gears.{gear}", gear)
                 yield f"bodies.{family}.gears_z_mm.{gear}: no such gear; {known}"
         if section.enabled and section.carrier is not None:
-            yield from _errors_of_carrier(case, f"bodies.{family}.carrier = {section.carrier!r}", section.carrier)
+            key = f"bodies.{family}.carrier = {section.carrier!r}"
+            carrier = case.bodies.get(section.carrier)
+            if carrier is None:
+                yield f"{key}: no such body; bodies are {', '.join(case.bodies)}"
+            elif not carrier.enabled:
+                yield f"{key}: that body is not enabled"
+            elif carrier.carrier is not None:
+                yield f"{key}: a carrier cannot be a planet"
+            elif carrier.spin_only:
+                yield f"{key}: a spin-only body has no position and cannot carry planets"
 
 
 def errors_of_pairs(case: GearboxFile) -> Iterator[str]:
@@ -93,18 +98,6 @@ def errors_of_blanks(case: GearboxFile) -> Iterator[str]:
             if blank not in seats:
                 known = ", ".join(seats) or "none yet"
                 yield f"bodies.{family}.shape.blanks.{blank}: no such seat on the body; seats are {known}"
-
-
-def _errors_of_carrier(case: GearboxFile, key: str, name: str) -> Iterator[str]:
-    carrier = case.bodies.get(name)
-    if carrier is None:
-        yield f"{key}: no such body; bodies are {', '.join(case.bodies)}"
-    elif not carrier.enabled:
-        yield f"{key}: that body is not enabled"
-    elif carrier.carrier is not None:
-        yield f"{key}: a carrier cannot be a planet"
-    elif carrier.spin_only:
-        yield f"{key}: a spin-only body has no position and cannot carry planets"
 
 
 def errors_of_inertia_sets(case: GearboxFile, inertia_sets: Sequence[str]) -> Iterator[str]:

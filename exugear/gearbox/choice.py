@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.variant import Variant
@@ -31,9 +33,7 @@ class Choice:
     models.
     """
     inertias: str | None
-    """Inertia set."""
     load_case: str | None
-    """Load case of a run."""
 
     def __init__(
         self,
@@ -60,3 +60,8 @@ class Choice:
     def inertia_set(self, gearbox: Gearbox) -> str:
         """Name of the chosen inertia set, or else of the default set of the gearbox file."""
         return self.inertias or gearbox.case.default_inertias
+
+
+def choice_of(attributes: Mapping[str, Any]) -> Choice:
+    """Return the model settings that a stored result was computed with, from its attributes, without load case."""
+    return Choice(*(str(attributes[key]) for key in ("variant", "mesh_model", "inertias")))

@@ -397,7 +397,6 @@ def pair_specs(
 
     Parameters
     ----------
-    sections, pairs : mappings of pair name
     modifications : by gear name
     mesh_forces : by pair name
         Static force F_bt of each enabled mesh, N; the force of the pair is the mean of their absolute values.
@@ -505,7 +504,12 @@ def _meshes_of_section(
         dx = gear_body.axis[0] - pinion_body.axis[0]
         dy = gear_body.axis[1] - pinion_body.axis[1]
         angle = math.atan2(dy, dx)
-        _check_angle(origin, key, stated_deg, angle)
+        off = 0.0 if stated_deg is None else math.remainder(angle - math.radians(stated_deg), 2 * math.pi)
+        if abs(off) > ANGLE_TOLERANCE:
+            raise origin.error(
+                f"{key}.position_angle_deg = {stated_deg}: the positions of the bodies result in "
+                f"{math.degrees(angle):.4f} deg; remove the key or correct the positions"
+            )
         z = _middle_of_faces(origin, key, pair, pinion_body, gear_body)
         yield Mesh(
             name=family + suffix,
@@ -519,15 +523,6 @@ def _meshes_of_section(
             position_angle=angle,
             centre_distance=math.hypot(dx, dy),
             phase=phase,
-        )
-
-
-def _check_angle(origin: Origin, key: str, stated_deg: float | None, angle: float) -> None:
-    """Raise an error if a specified angle of the line of centres differs from that of the body positions (rad)."""
-    if stated_deg is not None and abs(math.remainder(angle - math.radians(stated_deg), 2 * math.pi)) > ANGLE_TOLERANCE:
-        raise origin.error(
-            f"{key}.position_angle_deg = {stated_deg}: the positions of the bodies result in {math.degrees(angle):.4f}"
-            " deg; remove the key or correct the positions"
         )
 
 

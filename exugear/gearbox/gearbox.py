@@ -97,7 +97,6 @@ class Gearbox(ReprMixin):
     content: Mapping[str, Any]
     """Raw content of the file before validation."""
     permissions: Permissions = NOTHING_MORE
-    """Permissions of the file."""
 
     @classmethod
     def from_toml(cls, path: str | Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:
@@ -190,14 +189,9 @@ class Gearbox(ReprMixin):
             )
 
     def write_copy(self, path: Path, numbers: Mapping[str, float]) -> None:
-        """Write a copy of the gearbox file with some numbers replaced; comments, order and spacing are kept.
+        """Write a copy of the file into its folder, with numbers replaced by dotted key; comments and spacing are kept.
 
         The copy is checked before it is written, and written whole or not at all.
-
-        Parameters
-        ----------
-        path : new file in the folder of the gearbox file
-        numbers : values by dotted key, such as ``housing.factor``
 
         Raises
         ------
@@ -520,9 +514,7 @@ class Gearbox(ReprMixin):
     def output_radius(self) -> float:
         """Base radius of the overall output gear, m; 1 m for a rotor without gears."""
         name = self.case.overall.output_gear
-        if name is None:
-            return 1.0
-        return self.gears[name].base_radius
+        return 1.0 if name is None else self.gears[name].base_radius
 
     def start_speeds(self, case: LoadCase) -> dict[str, float]:
         """Rotational speeds of all bodies at the start of a load case, rad/s.
@@ -535,11 +527,7 @@ class Gearbox(ReprMixin):
         return self.train.rolling({self.case.overall.input: case.start_speed, **case.start_speeds})
 
     def mesh_orders(self, count: int = 3) -> dict[str, float]:
-        """Orders of all meshes with harmonics, by name; meshes of equal frequency (sun and ring) share an order.
-
-        Parameters
-        ----------
-        count : harmonics of each mesh, including the first
+        """Orders of all meshes with `count` harmonics, by name; meshes of equal frequency share an order.
 
         Examples
         --------

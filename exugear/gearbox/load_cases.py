@@ -99,7 +99,6 @@ class LoadSummary(ReprMixin, line=" {name!r}: net torque {net_torque:g} N m, {st
     """Summary of a load case on the kinematic gear train."""
 
     name: str
-    """Name of the load case."""
     inertia: float
     """Inertia of the whole train at the overall input, kg m2."""
     net_torque: float
@@ -579,12 +578,7 @@ def _shares(gearbox: Gearbox, forces: Floats, extreme: Callable[..., float]) -> 
 
 
 def speeds_beyond_tables(gearbox: Gearbox, lowest: float, highest: float) -> str:
-    """Return an error text for speeds that the table of an excitation does not cover; empty if all are covered.
-
-    Parameters
-    ----------
-    lowest, highest : speeds of the overall input without sign, rad/s
-    """
+    """Return an error text for input speeds (rad/s, no sign) outside the table of an excitation; empty for others."""
     speeds = gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
     for load in gearbox.varying_loads:
         if not load.curve or load.body not in speeds or speeds[load.body] == 0.0:

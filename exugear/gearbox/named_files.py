@@ -65,15 +65,9 @@ def check_regular(path: Path, largest: int) -> None:
 
 
 def named_file(name: str, folder: Path, permissions: Permissions, largest: int) -> Path:
-    """Path of a file that a gearbox file in `folder` names, if it may be read.
+    """Path of a file of at most `largest` bytes that a gearbox file in `folder` names, if it may be read.
 
     Symbolic links are resolved first.
-
-    Parameters
-    ----------
-    name : name in the gearbox file
-    folder : folder of the gearbox file
-    largest : maximum size of the file, bytes
 
     Raises
     ------

@@ -140,14 +140,9 @@ def _remedy_of_line(line: str) -> str:
 
 
 def parsed(parse: Callable[[], dict[str, Any]], source: str, form: str) -> dict[str, Any]:
-    """Run a parser of TOML or JSON and convert its exceptions to an error of the file.
+    """Run a parser of TOML or JSON (`form`) and convert its exceptions to an error of the file.
 
     Python's parsers raise ValueError for numbers of thousands of digits and exhaust the stack for deep nesting.
-
-    Parameters
-    ----------
-    parse : function that returns the content
-    source, form : name of the file and "TOML" or "JSON", for the message
 
     Raises
     ------
@@ -295,7 +290,6 @@ _TYPES = {
 
 
 def _remedy(error: Any) -> str:
-    """Return the remedy of an error."""
     if error["type"] == "extra_forbidden":
         if hint := renamed_hint([str(part) for part in error["loc"]], GEARBOX_RENAMES):
             return hint

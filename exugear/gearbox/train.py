@@ -67,7 +67,7 @@ class SpinConstraint:
 
 
 def mesh_row(spins: Sequence[str], mesh: MeshedBodies, pinion_share: float = 1.0, gear_share: float = 1.0) -> Floats:
-    """Return the mesh closure per unit rotation: r_b1 (t1 - tf) +- r_b2 (t2 - tf), flank s = +1.
+    """Return the mesh closure (spins,), m/rad, per unit rotation: r_b1 (t1 - tf) +- r_b2 (t2 - tf), flank s = +1.
 
     Plus for an external pair, minus for an internal one; tf is the rotation of the frame. It is also the torque on each
     body per unit mesh force, of which friction leaves a share on the driven gear.
@@ -76,10 +76,6 @@ def mesh_row(spins: Sequence[str], mesh: MeshedBodies, pinion_share: float = 1.0
     ----------
     spins : names of the bodies that can rotate; all others are stationary
     pinion_share, gear_share : shares of the torque on gear 1 and on gear 2
-
-    Returns
-    -------
-    array (spins,), m/rad
     """
     row = np.zeros(len(spins))
     pinion_radius = pinion_share * mesh.pair.pinion.base_radius
@@ -102,15 +98,11 @@ def coupling_row(spins: Sequence[str], coupling: CoupledBodies) -> Floats:
 
 
 def kinematic_modes(rows: Floats) -> Floats:
-    """Orthonormal basis of the rotations that satisfy all constraint rows (null space).
+    """Orthonormal basis (spins, degrees of freedom) of the rotations that satisfy all constraint rows (null space).
 
     Parameters
     ----------
     rows : (constraints, spins) of any units; each row is scaled by its largest entry
-
-    Returns
-    -------
-    (spins, degrees of freedom)
 
     Examples
     --------
@@ -141,16 +133,12 @@ BALANCE_TOLERANCE = 1e-9
 
 
 def holding_forces(rows: Floats, torques: Floats) -> Floats | None:
-    """Return the constraint forces in equilibrium with torques; if not unique, those of minimum norm.
+    """Return constraint forces (constraints,) that balance torques, those of minimum norm; None if no forces do.
 
     Parameters
     ----------
     rows : (constraints, spins) torques on the spins per unit force of each constraint
     torques : (spins,) N m
-
-    Returns
-    -------
-    array (constraints,), or None if no forces balance the torques.
 
     Examples
     --------
@@ -279,15 +267,11 @@ class Train(
         return self.rolling({body: speed})
 
     def rolling(self, speeds: Mapping[str, float]) -> dict[str, float]:
-        """Speeds of all bodies (rad/s) of the kinematic gear train for given speeds of some bodies.
+        """Speeds of all bodies (rad/s) of the kinematic gear train for given speeds (rad/s) of some bodies by name.
 
         In a train of several degrees of freedom, locked bodies are stationary. Exceptions are bodies that rotate with
         the first one given, with the input or with the output, and bodies that cannot be stationary at the given
         speeds.
-
-        Parameters
-        ----------
-        speeds : by body name, rad/s
 
         Raises
         ------

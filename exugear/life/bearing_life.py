@@ -124,7 +124,10 @@ class _RatedBearing:
         worst = np.concatenate([self.balance.at(carried, *self.acting.worst(sense)) for sense in (1, -1)])
         section = self.support.catalogue
         assert section is not None
-        rows = tuple(_sliced(row) for row in raceway_rows(catalogue_rows(section)))
+        rows = tuple(
+            replace(row, laminae=LAMINAE) if isinstance(row, RollerRow) else row
+            for row in raceway_rows(catalogue_rows(section))
+        )
         ratings = ratings_of(section)
         revolutions = points.revolutions * turns
         share = revolutions[:, None] / loads.shape[1]
@@ -266,10 +269,6 @@ class _RatedBearing:
             inner_ring_turns_against_load=not self.support.carries_outer_ring,
         )
         return life, max(float(state.element_pressure.max()) for state in states)
-
-
-def _sliced(row: RollingRow) -> RollingRow:
-    return replace(row, laminae=LAMINAE) if isinstance(row, RollerRow) else row
 
 
 def _interpolated(lives: tuple[Floats, Floats], radial: Floats) -> Floats:

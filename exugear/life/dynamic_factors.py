@@ -52,7 +52,6 @@ class DynamicFactor(ReprMixin):
     least: float = 1.0
     """Minimum factor."""
     source: str = ""
-    """Source as text."""
 
     def _line(self) -> str:
         return f": {self.value.min():.3f} to {self.value.max():.3f} at {len(self.speed)} speeds"
@@ -79,13 +78,7 @@ def stated_factors(gearbox: Gearbox, value: float) -> dict[str, DynamicFactor]:
 
 
 def factors_of_run(assembly: Assembly, rating: RatingSection, path: Path, body: str) -> dict[str, DynamicFactor]:
-    """Return the factors of mesh families over the speed of a body, from a run of the same variant.
-
-    Parameters
-    ----------
-    rating : with the load case of the run, and the minimum factor
-    path : file of the run
-    body : loaded body, whose speed counts
+    """Return the factors of mesh families over the speed of the loaded body, from a run of the same variant.
 
     Raises
     ------
@@ -165,11 +158,6 @@ SMALLEST = 1e-4
 def factors(assembly: Assembly, rating: RatingSection, folder: Path, body: str) -> Mapping[str, DynamicFactor]:
     """Return the factors of mesh families from the source in the gearbox file, reading the results folder if necessary.
 
-    Parameters
-    ----------
-    folder : results folder
-    body : loaded body
-
     Raises
     ------
     GearboxFileError
@@ -206,13 +194,7 @@ def _choice(assembly: Assembly, load_case: str | None = None) -> Choice:
 
 
 def factors_of_response(assembly: Assembly, rating: RatingSection, path: Path, body: str) -> dict[str, DynamicFactor]:
-    """Return the factors of mesh families over the speed of a body, from a steady-state response of the same variant.
-
-    Parameters
-    ----------
-    rating : with the method of the response, and the minimum factor
-    path : file of the response
-    body : loaded body, whose speed counts
+    """Return the factors of mesh families over the speed of the loaded body, from a response of the same variant.
 
     Raises
     ------

@@ -55,8 +55,6 @@ from fe_ste.tools.arrays import Floats
 from fe_ste.tools.stores import Layout, Store
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from fe_ste.root_stress import MeshCycleStress, RootGauges
 
 RZ_OF_RA = 6.0
@@ -153,9 +151,7 @@ def is_modified(gearbox: Gearbox, pair: GearPair) -> bool:
 
 def auxiliary_factor(gearbox: Gearbox, rating: RatingSection, pair: GearPair) -> float:
     """Return f_ZCa of ISO 6336-2:2019: the value of the file for modified flanks, otherwise 1.2."""
-    if rating.f_ZCa is not None and is_modified(gearbox, pair):
-        return rating.f_ZCa
-    return UNMODIFIED
+    return rating.f_ZCa if rating.f_ZCa is not None and is_modified(gearbox, pair) else UNMODIFIED
 
 
 def warn_beyond_tables(
@@ -191,13 +187,7 @@ def flank_lives(
     stresses: Mapping[str, MeshCycleStress],
     dynamic: Mapping[str, DynamicFactor],
 ) -> tuple[FlankLife, ...]:
-    """Rate all gears of pairs with known stresses.
-
-    Parameters
-    ----------
-    stresses : by pair name
-    dynamic : by mesh family
-    """
+    """Rate all gears of pairs with known stresses, by pair name, with K_v by mesh family."""
     pairs = {mesh.family: mesh.pair for mesh in gearbox.meshes}
     lives: dict[tuple[str, str, str], list[FlankLife]] = {}
     for tooth in teeth:
@@ -376,13 +366,10 @@ class _RatedTooth:
         roughness = 0.5 * (roughness_of(strength) + roughness_of(mate))
         still = lubricant_factor(softer, self.gearbox.viscosity_40)
         still *= roughness_factor(softer, roughness, reduced_radius(self.pair))
-        moving = np.array([velocity_factor(softer, self._velocity(float(value))) for value in speed])
-        return si(strength, "sigma_H_lim_MPa") * still * moving
-
-    def _velocity(self, speed: float) -> float:
-        """Return the pitch line velocity (m/s) at a speed (rad/s) of the loaded body."""
         gear = (self.pair.pinion, self.pair.gear)[self.tooth.member]
-        return speed * self.tooth.cycles / len(self.tooth.meshes) * gear.reference_radius
+        velocity = speed * self.tooth.cycles / len(self.tooth.meshes) * gear.reference_radius
+        moving = np.array([velocity_factor(softer, float(value)) for value in velocity])
+        return si(strength, "sigma_H_lim_MPa") * still * moving
 
 
 def roughness_of(strength: StrengthSection) -> float:
@@ -460,6 +447,8 @@ def pair_stresses(
     begin : called with the name of each pair before it is computed
     keep : whether to store computed stresses
     """
+    import xarray as xr
+
     from fe_ste.root_stress import MeshCycleStress, mesh_cycle_stress, root_gauges  # finite elements, not for checks
 
     known: dict[tuple[Gear, int], RootGauges] = {}
@@ -485,20 +474,14 @@ def pair_stresses(
             both = gauges(pair.pinion, 1), gauges(pair.gear, -1 if pair.gear.internal else 1)
             kept = mesh_cycle_stress(pair, request.stored.dataset, both)
             if keep:
-                store.write_dataset(_flank_dataset(kept, request.name))
+                variables = {
+                    name: (dims, np.asarray(getattr(kept, name)), {"units": units, "long_name": words})
+                    for name, (dims, units, words) in _FIELDS.items()
+                }
+                coordinates = {
+                    "torque": (("torque",), kept.torque, {"units": "N m"}),
+                    "misalignment": (("misalignment",), kept.misalignment, {"units": "rad"}),
+                }
+                store.write_dataset(xr.Dataset(variables, coordinates, {"pair": request.name, "method_version": LIFE}))
         stresses[request.name] = kept
     return stresses
-
-
-def _flank_dataset(stress: MeshCycleStress, pair: str) -> xr.Dataset:
-    import xarray as xr
-
-    variables = {
-        name: (dims, np.asarray(getattr(stress, name)), {"units": units, "long_name": words})
-        for name, (dims, units, words) in _FIELDS.items()
-    }
-    coordinates = {
-        "torque": (("torque",), stress.torque, {"units": "N m"}),
-        "misalignment": (("misalignment",), stress.misalignment, {"units": "rad"}),
-    }
-    return xr.Dataset(variables, coordinates, {"pair": pair, "method_version": LIFE})

@@ -96,13 +96,7 @@ def label(life: FlankLife, holder: str) -> str:
 def shortfalls(
     rating: RatingSection, flanks: Iterable[FlankLife], bearings: Iterable[BearingLife], hours: float
 ) -> Iterator[str]:
-    """Report parts below the required safety, over the life or under the largest load, or below the required life.
-
-    Parameters
-    ----------
-    rating : its `minimum_S_H`, `minimum_S_F` and `minimum_S_0`
-    hours : of operation in the life
-    """
+    """Report parts below the required safety, over the life or under the largest load, or below the required life."""
     for flank in flanks:
         of_flank = (flank.contact_safety, flank.contact_static)
         of_root = (flank.root_safety, flank.root_static)
@@ -156,20 +150,17 @@ def needs_of_relief(gearbox: Gearbox, flanks: Iterable[FlankLife]) -> Iterator[s
     for family, share in largest.items():
         if share > LEAST_OUTSIDE:
             gears = (pairs[family].pinion.name, pairs[family].gear.name)
-            given = " and ".join(filter(None, (_relief_in_words(gearbox, name) for name in gears)))
+            reliefs = {name: gearbox.case.gears[name].modification for name in gears}
+            given = " and ".join(
+                f"{relief.tip_relief_um:g} µm of tip relief on {name}"
+                for name, relief in reliefs.items()
+                if relief is not None and relief.tip_relief_um
+            )
             remedy = given and f"present: {given}; increase its amount or length"
             yield (
                 f"{family}: up to {100.0 * share:.1f} % of the load is outside the path of contact (tip-edge "
                 f"contact), where no stress is rated: {remedy or 'add tip relief'}"
             )
-
-
-def _relief_in_words(gearbox: Gearbox, name: str) -> str:
-    """Describe the tip relief of a gear in the file; empty without one."""
-    modification = gearbox.case.gears[name].modification
-    if modification is None or not modification.tip_relief_um:
-        return ""
-    return f"{modification.tip_relief_um:g} µm of tip relief on {name}"
 
 
 TOLD_SHARING = 1.0005
@@ -200,7 +191,6 @@ class Life(ReprMixin, line=" of {variant}: {flanks!n} flanks, {bearings!n} beari
     reliefs: tuple[str, ...]
     """Pairs with load outside their path of contact, which tip relief would remove."""
     assumptions: tuple[str, ...]
-    """Assumptions of the results."""
     input_hash: str
     """Hash of gearbox file, model settings, tables, load files and versions of methods."""
 
@@ -223,10 +213,6 @@ def rating_of(gearbox: Gearbox) -> RatingSection:
 
 def checked_loads(gearbox: Gearbox, progress: Progress | None = None) -> CountedLoads:
     """Read the load spectrum, and check all required input before the computation begins.
-
-    Parameters
-    ----------
-    progress : called with the number of files read and the total
 
     Raises
     ------
@@ -265,13 +251,7 @@ def check_keys(gearbox: Gearbox) -> None:
 
 
 def life_hash(assembly: Assembly, counted: CountedLoads, tables: Mapping[str, str], run: str = "") -> str:
-    """Return the SHA-256 of all input of a rating.
-
-    Parameters
-    ----------
-    tables : by pair name, hashes of the tables' inputs
-    run : input hash of the run or steady-state response for K_v
-    """
+    """Return the SHA-256 of all input of a rating, with hashes of the inputs of its tables (by pair) and run."""
     case = assembly.gearbox.content
     content = {
         "method_version": LIFE,

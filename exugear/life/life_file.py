@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from exugear.gearbox.choice import Choice
+from exugear.gearbox.choice import Choice, choice_of
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.versions import LIFE
@@ -105,7 +105,7 @@ def to_dataset(life: Life, gearbox: str) -> xr.Dataset:
         values = np.array([getattr(bearing.ratings, name) for bearing in life.bearings], dtype=np.float64)
         variables[f"bearing_{name}_rating"] = (("bearing",), values, {"units": "N"})
     coordinates = {
-        "flank": np.array([flank_label(flank) for flank in life.flanks], dtype=object),
+        "flank": np.array([f"{flank.gear} {flank.flank} {flank.family}" for flank in life.flanks], dtype=object),
         "bearing": np.array([bearing.name for bearing in life.bearings], dtype=object),
         "family": np.array([*life.load_sharing], dtype=object),
     }
@@ -124,11 +124,6 @@ def to_dataset(life: Life, gearbox: str) -> xr.Dataset:
         "method_version": LIFE,
     }
     return xr.Dataset(variables, coordinates, attributes)
-
-
-def flank_label(life: FlankLife) -> str:
-    """Return a label of gear, flank and family of meshes."""
-    return f"{life.gear} {life.flank} {life.family}"
 
 
 def stored_life(path: Path, input_hash: str) -> xr.Dataset | None:
@@ -211,21 +206,14 @@ class StoredLife:
     data: xr.Dataset | None
     """Content; None if it does not belong to the gearbox file."""
     reason: str = ""
-    """Reason in that case."""
 
 
 def stored_lives(gearbox: Gearbox, folder: Path, assembled: Callable[[Choice], Assembly]) -> Iterator[StoredLife]:
-    """Read all ratings of a folder.
-
-    Parameters
-    ----------
-    gearbox : gearbox of the folder
-    assembled : returns the model for given settings
-    """
+    """Read all ratings of a folder."""
     for path in sorted(folder.glob("*/*/life.nc")):
         try:
             data = read_life(path)
-            assembly = assembled(Choice(*(str(data.attrs[key]) for key in ("variant", "mesh_model", "inertias"))))
+            assembly = assembled(choice_of(data.attrs))
             counted = checked_loads(gearbox)
             source = source_hash(assembly, rating_of(gearbox), folder)
             tables = {request.name: request.wanted.hash for request in life_requests(assembly, counted, folder)}
@@ -248,13 +236,7 @@ LARGEST_DAMAGE = 1e6
 
 
 def draw_life(data: xr.Dataset, path: str | Path | None = None) -> Figure:
-    """Draw the damages of the limiting parts, and their distribution over torque.
-
-    Parameters
-    ----------
-    data : as `exugear.life.life_file.read_life` returns it
-    path : file for the picture
-    """
+    """Draw the damages of the limiting parts of a stored life, and their distribution over torque."""
     shown = [limit for limit in limits(data) if limit[2] > LEAST_DAMAGE][:SHOWN]
     with drawing_style():
         figure = new_figure(8.5, max(2.2, 0.8 + 0.24 * len(shown)))

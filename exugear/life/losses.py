@@ -157,9 +157,7 @@ class Losses:
     @property
     def efficiency(self) -> float:
         """Output power over input power; zero without power."""
-        if self.input_power > 0.0:
-            return self.output_power / self.input_power
-        return 0.0
+        return self.output_power / self.input_power if self.input_power > 0.0 else 0.0
 
 
 def losses_of(

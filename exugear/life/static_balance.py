@@ -114,9 +114,7 @@ class StaticBalance(ReprMixin, line=": {torque!n} torques, {angle!n} angles, lin
         forces = np.abs(self.at(self.mesh_force, torque, hub)[..., names]).max(axis=(1, 2))
         worst = int(forces.argmax())
         mean = float(np.abs(self.at(self.mesh_force, torque[[worst]])[..., names]).mean())
-        if mean:
-            return float(forces[worst]) / mean
-        return 1.0
+        return float(forces[worst]) / mean if mean else 1.0
 
 
 class States(NamedTuple):
@@ -244,7 +242,6 @@ def _solve_angle(
 def _static_coordinates(
     assembly: Assembly, body: str, torque: float, about: Floats, wrench: Floats | None, near: Floats | None
 ) -> Floats:
-    """Return the static coordinates, (size,)."""
     locked = assembly.gearbox.locked
     try:
         return locked_equilibrium(assembly, {body: torque}, locked, assembly.mean_meshes, about, wrench, near)
@@ -332,10 +329,6 @@ def _inner_rings(assembly: Assembly, q: Floats) -> tuple[Floats, Floats]:
 
 class KeptAngles(ReprMixin):
     """Solved angles in one file, which is rewritten with each.
-
-    Parameters
-    ----------
-    store : for all input of the rating
 
     Examples
     --------
@@ -465,7 +458,12 @@ def stress_requests(
     BalanceError
         No equilibrium under the static load.
     """
-    tilts = _misalignments(assembly)
+    tilts: dict[str, list[float]] = {}
+    if assembly.contacts.contacts:
+        state = static_state(assembly)
+        for contact_place in contact_places(state.assembly, state.q).values():
+            tilts.setdefault(contact_place.table.pair.name, []).append(contact_place.misalignment)
+    tilts = tilts
     reaches = _reaches(assembly, counted)
     found = []
     for request in requests:
@@ -477,16 +475,6 @@ def stress_requests(
             continue
         found.append(_wider(request, tilts[request.name], *reaches.get(request.name, (1.0, 0.0)), folder))
     return found
-
-
-def _misalignments(assembly: Assembly) -> dict[str, list[float]]:
-    """Return the static misalignments of the meshes of each pair in the axes of its table, rad."""
-    tilts: dict[str, list[float]] = {}
-    if assembly.contacts.contacts:
-        state = static_state(assembly)
-        for contact_place in contact_places(state.assembly, state.q).values():
-            tilts.setdefault(contact_place.table.pair.name, []).append(contact_place.misalignment)
-    return tilts
 
 
 def _reaches(assembly: Assembly, counted: CountedLoads) -> dict[str, tuple[float, float]]:

@@ -133,7 +133,7 @@ def study_design_changes(
     quantity: str | None = None,
     loads: Sequence[str] = (),
 ) -> DesignStudy | None:
-    """Compute what proposed design changes do to a resonance in the operating range.
+    """Compute what design changes do to a resonance in the operating range; None if it has no such resonance.
 
     Parameters
     ----------
@@ -141,10 +141,6 @@ def study_design_changes(
     resonance : rank of the resonance at the first load
     quantity : quantity that decides, as in `exugear.report.findings.ranking.DECIDING`; by default that of the file
     loads : names of load cases, or percentages of the static load such as ``50%``; by default the static load
-
-    Returns
-    -------
-    None if the response has fewer resonances in the range
 
     Raises
     ------

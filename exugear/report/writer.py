@@ -1,7 +1,4 @@
-"""Self-contained web page with the report of a results folder: its six parts, headline, controls and footer.
-
-`SECTIONS` has the order of the page; a part is made by a function from `ReportData` to its `Part`.
-"""
+"""Self-contained web page with the report of a results folder: its six parts, headline, controls and footer."""
 
 from __future__ import annotations
 
@@ -12,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from exugear.gearbox.choice import Choice
+from exugear.gearbox.choice import Choice, choice_of
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import static_load_in_words
 from exugear.gearbox.named_files import Permissions
@@ -22,7 +19,6 @@ from exugear.report.findings.context import (
     ReportError,
     StoredResults,
     bytes_of_runs,
-    choice_of,
     shown_path,
     stored_models,
     with_responses,
@@ -86,7 +82,6 @@ def command_line(gearbox: Gearbox, folder: Path, verb: str, model: Choice) -> st
 
 
 def _scope(material: ReportData) -> str:
-    """Describe the gearbox and the results below the name of the page."""
     gearbox = material.context.gearbox
     rated = gearbox.case.operation.rated_speed_rpm
     parts = [] if rated is None else [f"rated {rated:g} rpm"]
@@ -119,9 +114,7 @@ class Report:
     """Report that was written."""
 
     path: Path
-    """Path of the page."""
     statements: tuple[str, ...]
-    """Statements of the summary."""
     resonances: tuple[dict[str, Any], ...]
     """Ranking that the page leads with, as `exugear steady` has it in ``--json``; the first is the headline."""
     missing: tuple[str, ...]
@@ -129,7 +122,6 @@ class Report:
     left_out: tuple[str, ...]
     """Skipped files that do not belong to the gearbox file, and results that could not be computed, with the reason."""
     gearbox: Gearbox
-    """Gearbox of the results."""
     headline: Headline | None = None
     """Ranking of the page; None if nothing is ranked."""
     findings: tuple[Finding, ...] = ()

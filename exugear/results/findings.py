@@ -1,7 +1,4 @@
-"""Findings on results: what passed a validity check, what a user should know, and what makes a result invalid.
-
-Each finding is stated once, and both the command line and the report print it.
-"""
+"""Findings on results: what passed a validity check, what a user should know, and what makes a result invalid."""
 
 from __future__ import annotations
 

@@ -57,11 +57,7 @@ def _checksum(kept: dict[str, Any]) -> str:
 
 
 def read_stored_gearbox(folder: Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:
-    """Read the gearbox that the results in a folder belong to.
-
-    Parameters
-    ----------
-    permissions : in which other folder files named in the gearbox file may lie
+    """Read the gearbox of the results in a folder; the permissions are for the files that it names.
 
     Raises
     ------
@@ -118,7 +114,6 @@ class StepTiming:
     """Run time and memory of a step of the computation."""
 
     step: str
-    """Name of the step."""
     seconds: float
     """Wall-clock time, s."""
     memory: float
@@ -208,7 +203,6 @@ class StoredStudy:
     """A study in a results folder with its combined dataset."""
 
     path: Path
-    """Path of the dataset."""
     title: str
     description: str
     points: int
@@ -231,13 +225,7 @@ def case_digest(gearbox: Gearbox, of_life: bool = False) -> str:
 
 
 def stored_studies(folder: Path, gearbox: Gearbox) -> Iterator[StoredStudy]:
-    """Find the studies in a results folder, without files of other versions or other content.
-
-    Parameters
-    ----------
-    folder : results folder
-    gearbox : gearbox to which the folder belongs
-    """
+    """Find the studies of a gearbox in a results folder, without files of other versions or other content."""
     for path in sorted((folder / STUDIES).glob(f"*/{DATASET}")):
         try:
             with open_dataset(path, STUDY_LAYOUT) as data:
@@ -280,8 +268,8 @@ def duty_summary(duty: BearingLoadState) -> dict[str, Any]:
         "ratings_estimated": duty.ratings.estimated,
         "ratings_of_makers": list(duty.ratings.makers),
         "two_designs": duty.ratings.two_designs,
-        "L10_Mrev": _finite(duty.basic_life),
-        "L10r_Mrev": _finite(duty.reference_life),
+        "L10_Mrev": finite_or_none(duty.basic_life),
+        "L10r_Mrev": finite_or_none(duty.reference_life),
         "remarks": list(duty.remarks),
     }
 
@@ -294,9 +282,9 @@ def mesh_summary(duty: MeshLoadState) -> dict[str, Any]:
         "misalignment_mrad": 1e3 * duty.misalignment,
         "opening_um": 1e6 * duty.opening,
         "centre_distance_change_um": 1e6 * duty.centre_distance_change,
-        "load_centroid_mm": _finite(1e3 * duty.load_centroid),
-        "K_Hbeta": _finite(duty.face_load_factor),
-        "sigma_H_misaligned_MPa": _finite(1e-6 * duty.pressure),
+        "load_centroid_mm": finite_or_none(1e3 * duty.load_centroid),
+        "K_Hbeta": finite_or_none(duty.face_load_factor),
+        "sigma_H_misaligned_MPa": finite_or_none(1e-6 * duty.pressure),
         "remark": duty.remark,
     }
 
@@ -323,10 +311,9 @@ def read_duties(path: Path) -> dict[str, Any]:
     raise FileError(f"{path}: was written by another version; run exugear bearings again")
 
 
-def _finite(value: float) -> float | None:
-    if math.isfinite(value):
-        return value
-    return None
+def finite_or_none(value: float) -> float | None:
+    """Return a number for JSON, which has none that is not finite."""
+    return value if math.isfinite(value) else None
 
 
 def write_duties(

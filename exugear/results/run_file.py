@@ -126,7 +126,6 @@ class RunPieces:
 
     Parameters
     ----------
-    folder : folder of the pieces
     attributes
         Attributes of a new run. If omitted, the run of the existing pieces is resumed.
 
@@ -384,7 +383,16 @@ class RunFile:
 
     def _take(self, piece: Piece) -> None:
         if self._last is None:
-            self._begin(piece)
+            self._raw = self._open.enter_context(replacement(self._path, self._pieces.folder))
+            self._target = ErrorKeeper(self._raw)
+            self._file = self._open.enter_context(h5netcdf.File(self._target, "w"))
+            for dimension, names in piece.names.items():
+                self._file.dimensions[dimension] = len(names) or None
+                made = self._file.create_variable(dimension, (dimension,), TEXT)
+                if names:
+                    made[:] = np.array(names, dtype=object)
+            self._file.dimensions["time"] = self._samples
+            _define(self._file, {name: values for name, values in piece.arrays.items() if _dimension(name) == "time"})
         samples = {name: values for name, values in piece.arrays.items() if _dimension(name) == "time"}
         end = self._written + len(samples["time"])
         for name, values in samples.items():
@@ -394,26 +402,12 @@ class RunFile:
         self._lines.append({name: values for name, values in piece.arrays.items() if _dimension(name) in GROWING[1:]})
         self._last, self._written, self._taken = piece, end, self._taken + 1
 
-    def _begin(self, piece: Piece) -> None:
-        """Create the file with the names of a piece and space for all samples."""
-        self._raw = self._open.enter_context(replacement(self._path, self._pieces.folder))
-        self._target = ErrorKeeper(self._raw)
-        self._file = self._open.enter_context(h5netcdf.File(self._target, "w"))
-        for dimension, names in piece.names.items():
-            self._file.dimensions[dimension] = len(names) or None
-            made = self._file.create_variable(dimension, (dimension,), TEXT)
-            if names:
-                made[:] = np.array(names, dtype=object)
-        self._file.dimensions["time"] = self._samples
-        _define(self._file, {name: values for name, values in piece.arrays.items() if _dimension(name) == "time"})
-
 
 class _Unfinished(Exception):
     """Exception that closes a file that is not kept."""
 
 
 def _dimension(name: str) -> str:
-    """First dimension of a variable."""
     return VARIABLES[name].dimensions[0]
 
 
@@ -459,11 +453,7 @@ def load_run(path: str | Path, names: Iterable[str] | None = None) -> xr.Dataset
 
 
 def read_run(path: Path, names: Iterable[str]) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-    """Read some variables and the attributes of a run, without labels; this avoids the import time of xarray.
-
-    Parameters
-    ----------
-    path : ``run.nc``, or the folder ``run.partial`` of a run that was stopped
+    """Read some variables and the attributes of a run or of its pieces, without labels and the import of xarray.
 
     Raises
     ------

@@ -89,10 +89,6 @@ class SolverComparison(ReprMixin, line=" of {exudyn}, {duration:.3g} s: {largest
 def compare_solvers(path: Path, exudyn_path: Path) -> SolverComparison:
     """Compare a run of the compiled solver with the same one by Exudyn.
 
-    Parameters
-    ----------
-    path, exudyn_path : the files of both runs
-
     Raises
     ------
     FileError

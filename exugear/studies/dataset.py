@@ -31,11 +31,7 @@ _LOCAL = "slope_"
 
 
 def dataset_of(study: Study, records: Mapping[str, Record]) -> xr.Dataset:
-    """Combine finished points into a dataset; missing and failed points are NaN, with the reason in `error`.
-
-    Parameters
-    ----------
-    records : by hash
+    """Combine records by hash into a dataset; missing and failed points are NaN, with the reason in `error`.
 
     Returns
     -------
@@ -219,7 +215,6 @@ class Criteria:
     """Criteria for the points of an optimisation."""
 
     outputs: tuple[str, ...]
-    """Minimised outputs."""
     limits: tuple[tuple[str, Side, float], ...]
     """Output, limited side and limit."""
     percentile: float
@@ -302,12 +297,7 @@ def is_pareto_optimal(outputs: Floats) -> Booleans:
 def searched_dataset(
     study: Study, criteria: Criteria, points: Sequence[EvaluatedPoint], records: Mapping[str, Record]
 ) -> xr.Dataset:
-    """Return all evaluated points of an optimisation in their order, with the percentiles used as criteria.
-
-    Parameters
-    ----------
-    records : by hash
-    """
+    """Return all evaluated points of an optimisation in their order, with the percentiles used as criteria."""
     dataset = dataset_of(replace(study, design=_design(study, points)), records)
     judged = {side: _judged(dataset, study, criteria, *side) for side in criteria.sides}
     words = {"long_name": "whether all limits are met"}

@@ -36,7 +36,7 @@ from exugear.gearbox.named_files import Permissions
 from exugear.gearbox.reading import GearboxFileError
 from exugear.results.folder import peak_memory
 from exugear.studies.point_results import PointError, PointResults, PointSettings, Shared
-from exugear.studies.quantities import Output, Values
+from exugear.studies.quantities import Output
 from exugear.studies.sampling import changed
 from exugear.system.gearbox_checks import check_parts
 from fe_ste.tools.files import FileError, open_regular, write_all
@@ -128,12 +128,7 @@ def number_of(value: Any) -> float:
 
 
 class Journal:
-    """Journal of this process in a folder, created with its first line.
-
-    Parameters
-    ----------
-    folder : of the study
-    """
+    """Journal of this process in a folder, created with its first line."""
 
     def __init__(self, folder: Path) -> None:
         host = re.sub(r"[^A-Za-z0-9]", "", platform.node())[:20] or "host"
@@ -160,13 +155,7 @@ class Journal:
 
 
 def read_journals(folder: Path, wanted: Collection[str]) -> dict[str, Record]:
-    """Return the finished points of a folder among those wanted; a success has priority over a failure.
-
-    Parameters
-    ----------
-    folder : of the study
-    wanted : hashes
-    """
+    """Return the finished points of a folder among those wanted (hashes); a success has priority over a failure."""
     journals: dict[str, Record] = {}
     for path in sorted((folder / FOLDER).glob(f"*{_END}")):
         try:
@@ -206,9 +195,7 @@ class Task:
     choice: Choice
     settings: PointSettings
     outputs: Mapping[str, Output]
-    """By name."""
     folder: Path
-    """Folder of the study."""
     parameters: Mapping[str, str] = field(default_factory=dict)
     """Names of the parameters that set values in the gearbox file, by path."""
 
@@ -221,10 +208,8 @@ class PointInput:
     changes: Mapping[str, Any]
 
 
-@lru_cache(maxsize=4)
-def _journal(folder: Path) -> Journal:
-    """Return the journal of this process; a worker takes batches of one study at a time."""
-    return Journal(folder)
+_journal = lru_cache(maxsize=4)(Journal)
+"""Journal of this process; a worker takes batches of one study at a time."""
 
 
 def compute_batch(task: Task, batch: Sequence[PointInput]) -> list[Record]:
@@ -265,7 +250,11 @@ def compute_point(task: Task, work: PointInput) -> Record:
         results = PointResults(gearbox, task.choice, task.settings, Shared(task.folder / SHARED_FOLDER), folder)
         for name, kept in task.outputs.items():
             try:
-                values[name] = _journal_form(kept.of(results))
+                found = kept.of(results)
+                if isinstance(found, Mapping):
+                    values[name] = {label: json_number(float(value)) for label, value in found.items()}
+                else:
+                    values[name] = json_number(float(found))
             except PointError as reason:  # the other outputs of the point are valid
                 error += f"{'; ' if error else ''}outputs.{name}: {reason}"
         doubts = list(results.doubts)
@@ -291,13 +280,6 @@ def _built(task: Task, work: PointInput) -> Gearbox:
         ]
         more = [f"and {len(lines) - SHOWN_VALUES} more"] if len(lines) > SHOWN_VALUES else []
         raise GearboxFileError(*("; ".join([*lines[:SHOWN_VALUES], *more]) for _ in lines[:1]), *error.errors) from None
-
-
-def _journal_form(values: Values) -> Any:
-    """Return values in the form used in a journal."""
-    if isinstance(values, Mapping):
-        return {name: json_number(float(value)) for name, value in values.items()}
-    return json_number(float(values))
 
 
 CONNECT_SECONDS = 30.0
@@ -352,12 +334,7 @@ def processes(workers: int | None = None) -> Opens:
 
 
 def dask_cluster(address: str) -> Opens:
-    """Return the workers of a Dask scheduler; they need access to the same folders as this process.
-
-    Parameters
-    ----------
-    address : such as ``tcp://10.0.0.1:8786``
-    """
+    """Return the workers of a Dask scheduler (``tcp://10.0.0.1:8786``), which need the same folders as this process."""
 
     @contextmanager
     def opened() -> Iterator[Pool]:
@@ -399,13 +376,7 @@ def given(executor: StudyExecutor, workers: int | None = None) -> Opens:
 
 
 class PersistentPool:
-    """Workers that are kept for several calls, and restarted only after they were lost.
-
-    Parameters
-    ----------
-    opens : callable
-        Starts workers.
-    """
+    """Workers that are kept for several calls, and restarted only after they were lost."""
 
     def __init__(self, opens: Opens) -> None:
         self._opens = opens
@@ -434,11 +405,6 @@ class PersistentPool:
         """Stop the workers."""
         self._pool = None
         self._stack.close()
-
-
-def lost_worker(error: BaseException) -> bool:
-    """Return whether a future's error means the loss of its worker only; `BrokenExecutor` is the loss of all."""
-    return isinstance(error, CancelledError) or type(error).__name__ == "KilledWorker"
 
 
 class Pace:
@@ -547,7 +513,8 @@ class _Running:
         except BrokenExecutor:
             raise
         except (Exception, CancelledError) as error:
-            if not lost_worker(error):
+            # The loss of its worker only; `BrokenExecutor` is the loss of all.
+            if not (isinstance(error, CancelledError) or type(error).__name__ == "KilledWorker"):
                 raise
             self.again(batch)
             return
@@ -570,7 +537,7 @@ class _Running:
 
 
 def compute_points(task: Task, points: Iterable[PointInput], opens: Opens, tell: Tell) -> dict[str, Record]:
-    """Compute points on workers.
+    """Compute points on workers; return their records by hash.
 
     Parameters
     ----------
@@ -578,10 +545,6 @@ def compute_points(task: Task, points: Iterable[PointInput], opens: Opens, tell:
         Starts workers, as `exugear.studies.executors.processes`; called again when they are lost.
     tell : callable
         Called with each returned record.
-
-    Returns
-    -------
-    by the hash of the point
 
     Raises
     ------

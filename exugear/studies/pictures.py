@@ -43,7 +43,6 @@ def draw_study(dataset: xr.Dataset, folder: Path, minimised: tuple[str, ...] = (
     Parameters
     ----------
     dataset : as `exugear.studies.dataset.dataset_of` makes it
-    folder : of the study
     minimised : outputs minimised by an optimisation, or their percentiles over tolerances
     """
     drawn = []

@@ -242,7 +242,6 @@ class PointSettings:
     duration: float | None = None
     """Duration of runs, s; by default that of the load case."""
     solver: Solver | None = None
-    """Solver of runs."""
 
 
 @dataclass
@@ -319,9 +318,9 @@ class PointResults:
         """
         if self.settings.steady is None:
             raise PointError("results of the steady-state response require a section [steady] with speeds")
-        from exugear.steady.steady_file import to_dataset
+        from exugear.steady.steady_file import to_dataset, with_names
 
-        return to_dataset(response_of(self.assembly, self.settings.steady, progress=_ignore_progress))
+        return with_names(to_dataset(response_of(self.assembly, self.settings.steady, progress=_ignore_progress)))
 
     @cached_property
     def run(self) -> xr.Dataset:

@@ -19,7 +19,7 @@ from exugear.gearbox.renames import STUDY_RENAMES, renamed_hint
 from exugear.gearbox.units import RPM
 from exugear.life.life_file import limits
 from exugear.steady.mean_system.signals import BODY_SPEED, COUPLING_TORQUE, SURFACE_VELOCITY, named_amplitudes
-from exugear.steady.peaks import line_name, peaks
+from exugear.steady.peaks import peaks
 from exugear.steady.steady_file import complex_amplitudes
 from exugear.studies.point_results import PointError, PointResults
 from exugear.system.modes import FREE_ROTATION, Modes
@@ -92,7 +92,6 @@ _TYPES: dict[str, tuple[type, ...]] = {"float": (int, float), "int": (int,), "st
 
 
 def _fits(value: object, kind: str) -> bool:
-    """Return whether a value has the type of an annotation."""
     if kind == "Sequence[float]":
         return isinstance(value, list) and bool(value) and all(_fits(entry, "float") for entry in value)
     return isinstance(value, _TYPES[kind]) and (kind == "bool" or not isinstance(value, bool))
@@ -284,7 +283,6 @@ def nearest_names(name: str, known: Sequence[str]) -> str:
 
 
 def _amplitudes(results: PointResults, signal: str) -> Floats:
-    """Return the amplitudes (points, lines) of a signal."""
     names = [str(name) for name in results.steady["signal"].to_numpy()]
     found = named_amplitudes(names, complex_amplitudes(results.steady), signal)
     if found is None:
@@ -294,8 +292,7 @@ def _amplitudes(results: PointResults, signal: str) -> Floats:
 
 def _line(results: PointResults, name: str) -> int:
     """Return the index of an order by its name, such as ``2 x sun_planet``."""
-    bases = tuple(str(base) for base in results.steady["base"].to_numpy())
-    names = [line_name(tuple(int(n) for n in row), bases) for row in results.steady["index"].to_numpy()]
+    names = [str(own) for own in results.steady["line"].to_numpy()]
     if name not in names:
         raise PointError(f"no line {name!r}; lines are {', '.join(names[1:8])} and so on")
     return names.index(name)
@@ -359,11 +356,6 @@ def contact_pressure(results: PointResults, *, pair: str) -> float:
     return float(largest_contact_stress(results.gearbox.pairs[pair].pair, table.static_state))
 
 
-def ripples(ste: Floats) -> Floats:
-    """Return the peak-to-peak values of a transmission error over positions (the first axis)."""
-    return np.asarray(np.ptp(ste, axis=0), dtype=np.float64)
-
-
 def worst_ripple(
     results: PointResults,
     *,
@@ -374,7 +366,7 @@ def worst_ripple(
 ) -> float:
     """Largest peak-to-peak static transmission error over loads and misalignments."""
     data = results.states(pair, positions, torque_factors, misalignment_um)
-    return float(ripples(data["ste"].to_numpy()).max())
+    return float(np.ptp(data["ste"].to_numpy(), axis=0).max())
 
 
 def mean_ripple(
@@ -387,7 +379,7 @@ def mean_ripple(
 ) -> float:
     """Mean peak-to-peak static transmission error over loads and misalignments."""
     data = results.states(pair, positions, torque_factors, misalignment_um)
-    return float(ripples(data["ste"].to_numpy()).mean())
+    return float(np.ptp(data["ste"].to_numpy(), axis=0).mean())
 
 
 def worst_pressure(
@@ -416,22 +408,22 @@ Worst = Callable[[Iterable[float]], float]
 
 def contact_safeties(results: PointResults, *, of: str = "life") -> dict[str, float]:
     """Safety factor S_H (pitting) by gear, flank and meshes; for planets the worst."""
-    return _flank_values(results, SAFETIES[of].format("contact"))
+    return _values_of(results, "flank", SAFETIES[of].format("contact"))
 
 
 def root_safeties(results: PointResults, *, of: str = "life") -> dict[str, float]:
     """Safety factor S_F (tooth root breakage) by gear, flank and meshes; for planets the worst."""
-    return _flank_values(results, SAFETIES[of].format("root"))
+    return _values_of(results, "flank", SAFETIES[of].format("root"))
 
 
 def contact_damages(results: PointResults) -> dict[str, float]:
     """Pitting damage (Miner's sum) by gear, flank and meshes; for planets the worst."""
-    return _flank_values(results, "contact_damage")
+    return _values_of(results, "flank", "contact_damage")
 
 
 def root_damages(results: PointResults) -> dict[str, float]:
     """Tooth root damage (Miner's sum) by gear, flank and meshes; for planets the worst."""
-    return _flank_values(results, "root_damage")
+    return _values_of(results, "flank", "root_damage")
 
 
 def worst_planets(results: PointResults) -> dict[str, float]:
@@ -473,10 +465,7 @@ def bearing_damages(results: PointResults, *, by: str = MINIMUM) -> dict[str, fl
 
 def static_safeties(results: PointResults) -> dict[str, float]:
     """Safety factor S_0 (static) of bearings under the largest load."""
-    data = results.life
-    return dict(
-        zip(map(str, data["bearing"].to_numpy()), map(float, data["bearing_static_safety"].to_numpy()), strict=True)
-    )
+    return _values_of(results, "bearing", "static_safety")
 
 
 def bearing_life(results: PointResults, *, bearing: str = "", by: str = MINIMUM) -> float:
@@ -510,9 +499,9 @@ def shortfalls(results: PointResults) -> float:
     return float(sum(len(json.loads(results.life.attrs[key])) for key in ("failures", "shortfalls")))
 
 
-def _flank_values(results: PointResults, key: str) -> dict[str, float]:
+def _values_of(results: PointResults, kind: Literal["flank", "bearing"], key: str) -> dict[str, float]:
     data = results.life
-    return dict(zip(map(str, data["flank"].to_numpy()), map(float, data[f"flank_{key}"].to_numpy()), strict=True))
+    return dict(zip(map(str, data[kind].to_numpy()), map(float, data[f"{kind}_{key}"].to_numpy()), strict=True))
 
 
 def _bearing_values(results: PointResults, key: str, by: str, worst: Worst) -> dict[str, float]:
@@ -622,12 +611,7 @@ class Output:
 
 
 def outputs_of(sections: Mapping[str, Mapping[str, Any]], known: Mapping[str, OutputKind]) -> dict[str, Output]:
-    """Check the sections of a study file and return the outputs they specify.
-
-    Parameters
-    ----------
-    sections : by the name in the dataset: ``quantity`` and its options
-    known : available kinds of output
+    """Check the sections of a study file, by their names in the dataset, and return the outputs they specify.
 
     Raises
     ------

@@ -85,7 +85,6 @@ class StudyResult:
     path: Path | None
     """File of the dataset; None for a part if other parts are not finished."""
     dataset: xr.Dataset | None
-    """Content of the dataset."""
 
     @property
     def failed(self) -> list[Record]:
@@ -261,12 +260,6 @@ def optimise(
     study: Study, folder: str | Path, opens: Opens | None = None, *, progress: Progress | None = None
 ) -> StudyResult:
     """Optimise the parameters of a study with a section ``optimise``.
-
-    Parameters
-    ----------
-    folder : folder of the points and the dataset
-    opens : callable, optional
-        Starts workers; processes on all cores by default.
 
     Returns
     -------

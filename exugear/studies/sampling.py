@@ -103,12 +103,7 @@ def shares(sampling: Sampling, count: int, dimensions: int, seed: int) -> Floats
 
 
 def correlated(independent: Floats, correlation: float) -> Floats:
-    """Return probabilities (count, members) of a group with equal pairwise correlation (Gaussian copula).
-
-    Parameters
-    ----------
-    independent : (count, members) uncorrelated probabilities
-    correlation : of the normal variables behind any two members, 0 to 1
+    """Return probabilities (count, members) of a group with equal pairwise correlation, 0 to 1 (Gaussian copula).
 
     Examples
     --------
@@ -137,12 +132,7 @@ class PathError(ValueError):
 
 
 def value_at(content: Mapping[str, Any], path: str) -> Any:
-    """Return the value at a path; None if there is none.
-
-    Parameters
-    ----------
-    content : of a gearbox file
-    path : keys joined by dots; list entries are numbered from 0
+    """Return the value at a path (keys joined by dots, list entries numbered from 0); None if there is none.
 
     Examples
     --------
@@ -291,7 +281,6 @@ class Axis:
 
     dimensions: tuple[str, ...]
     values: Any
-    """Array."""
     units: str = ""
     path: str = ""
     """Paths that it sets, as text."""

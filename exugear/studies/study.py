@@ -331,7 +331,6 @@ class Study(ReprMixin):
     """
 
     file: StudyFile
-    """Content of the study file."""
     source: str
     """Path or name of the study file."""
     gearbox: Gearbox
@@ -339,7 +338,6 @@ class Study(ReprMixin):
     choice: Choice
     settings: PointSettings
     outputs: Mapping[str, Output]
-    """By name."""
     design: Design
     """All points; none for an optimisation."""
     case_digest: str
@@ -354,12 +352,7 @@ class Study(ReprMixin):
         permissions: Permissions = NOTHING_MORE,
         quantities: Mapping[str, OutputKind] = QUANTITIES,
     ) -> Study:
-        """Read and check a study file and its gearbox file.
-
-        Parameters
-        ----------
-        permissions : of the gearbox file
-        quantities : available kinds of output
+        """Read and check a study file and its gearbox file, to which the permissions apply.
 
         Raises
         ------
@@ -394,7 +387,15 @@ class Study(ReprMixin):
             design = design_of(file, gearbox) if file.optimise is None else Design({}, {}, ())
             tolerances = tolerances_of(file, gearbox)
             kept = outputs_of(file.outputs, quantities)
-            settings = _settings(file)
+            steady = None
+            if file.steady is not None:
+                section = file.steady
+                check_law(file.choice.mesh_model, section.method)
+                speeds = SpeedRange.from_text(section.speeds)
+                steady = SteadySettings(
+                    speeds, section.method, section.harmonics, section.combinations, section.at_resonances
+                )
+            settings = PointSettings(steady, file.run.duration_s, file.run.solver)
         except (PathError, OutputError, SteadyError, ValueError) as error:
             if isinstance(error, GearboxFileError | StudyError):
                 raise
@@ -460,7 +461,6 @@ def _guarded(key: str, check: Any, *arguments: Any) -> None:
 
 
 def _texts(content: Any) -> Iterator[str]:
-    """Yield all texts in a content."""
     if isinstance(content, str):
         yield content
     elif isinstance(content, Mapping):
@@ -483,14 +483,3 @@ def _patterns(content: Any) -> Iterator[str]:
 def _reads_life(outputs: Mapping[str, Output]) -> bool:
     """Return whether load spectra are read."""
     return any(kept.quantity.needs in ("life", "bearings") for kept in outputs.values())
-
-
-def _settings(file: StudyFile) -> PointSettings:
-    """Return the settings for the results of points."""
-    steady = None
-    if file.steady is not None:
-        section = file.steady
-        check_law(file.choice.mesh_model, section.method)
-        speeds = SpeedRange.from_text(section.speeds)
-        steady = SteadySettings(speeds, section.method, section.harmonics, section.combinations, section.at_resonances)
-    return PointSettings(steady, file.run.duration_s, file.run.solver)

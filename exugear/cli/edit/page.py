@@ -7,26 +7,17 @@ from typing import Any
 
 from exugear.cli.edit.places import schema_for_completion
 from exugear.cli.edit.work import KINDS
-from exugear.report.web.document import STYLES, ArrayStore, whole_page
+from exugear.report.web.document import NO_RESULTS, STYLES, ArrayStore, whole_page
 from exugear.report.web.html import render
 
 LIBRARIES = ("codemirror.min.js", "three.min.js", "uPlot.iife.min.js")
 
 
 def edit_page(case: Path, nonce: str) -> bytes:
-    """Return the page of a gearbox file, without its text.
-
-    Parameters
-    ----------
-    nonce : random text, for the style elements of the editor
-    """
+    """Return the page of a gearbox file, without its text; the style elements of the editor have a nonce."""
     data: dict[str, Any] = {
         "name": case.name,
-        "input": "",
-        "rated": None,
-        "lines": [],
-        "groups": [],
-        "charts": {},
+        **NO_RESULTS,
         "models": {},
         "nonce": nonce,
         "schema": schema_for_completion(),

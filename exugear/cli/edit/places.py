@@ -101,6 +101,10 @@ _VALUE = re.compile(r" = '([^']*)': (?:no such [a-z ]+; )?did you mean")
 _RENAMED = re.compile(r"was renamed to (?:[\w.]*\.)?(\w+);")
 
 
+_places_of_steps = lru_cache(maxsize=2)(places)
+"""Places of a text whose messages come step by step."""
+
+
 def placed(texts: Iterable[str], kind: Literal["error", "warning"], source: str, text: str) -> list[Remark]:
     """Return messages of a reader about the file `source` at their lines in its text.
 
@@ -109,14 +113,8 @@ def placed(texts: Iterable[str], kind: Literal["error", "warning"], source: str,
     >>> placed(["x.toml: gears.sun.teth: unknown key; did you mean 'teeth'?"], "error", "x.toml", "gears.sun.teth = 2")
     [Remark(text="gears.sun.teth: unknown key; did you mean 'teeth'?", kind='error', line=1, old='teth', new='teeth')]
     """
-    known = _known_places(text)
+    known = _places_of_steps(text)
     return [_placed(message.removeprefix(f"{source}: "), kind, text, known) for message in texts]
-
-
-@lru_cache(maxsize=2)
-def _known_places(text: str) -> Mapping[str, int]:
-    """Places of a text whose messages come step by step."""
-    return places(text)
 
 
 def _placed(message: str, kind: Literal["error", "warning"], text: str, known: Mapping[str, int]) -> Remark:

@@ -13,7 +13,7 @@ import secrets
 import sys
 import threading
 import time
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import closing, suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -58,14 +58,7 @@ class RefusedError(Exception):
 
 
 class EditServer(ThreadingHTTPServer):
-    """Server of one gearbox file, on this machine only.
-
-    Parameters
-    ----------
-    case, folder : gearbox file and results folder
-    allow_dir : another folder whose files the gearbox file may name
-    port : 0 for any free port
-    """
+    """Server of one gearbox file, on this machine only; port 0 is any free one."""
 
     daemon_threads = True
     request_queue_size = 128
@@ -189,9 +182,22 @@ class Handler(BaseHTTPRequestHandler):
         if path == "state":
             text, tab, geometry = (str(content.get(key, "")) for key in ("text", "tab", "geometry"))
             server.file.latest = text
-            self._send_steps(server.analyst.steps(text, tab, geometry))
+            # The rest is not computed for a page that has gone.
+            steps = server.analyst.steps(text, tab, geometry)
+            with closing(steps):
+                self._begin("application/x-ndjson", HTTPStatus.OK, {})
+                for step in steps:
+                    self.wfile.write(json.dumps(step).encode() + b"\n")
+                    self.wfile.flush()
         elif path == "save":
-            self._save(str(content.get("text", "")), str(content.get("digest", "")))
+            try:
+                self.server.file.save(str(content.get("text", "")), str(content.get("digest", "")))
+            except OSError as error:
+                reason = f"{error.filename or self.server.file.case}: {error.strerror or error}"
+                raise RefusedError(
+                    HTTPStatus.INTERNAL_SERVER_ERROR,
+                    f"The file was not saved and has its earlier content ({reason}). The text is still in this page.",
+                ) from error
             self._send_json(server.file.told())
         elif path == "start" and content.get("kind") in KINDS:
             self._start(str(content["kind"]))
@@ -202,18 +208,7 @@ class Handler(BaseHTTPRequestHandler):
         else:
             raise RefusedError(HTTPStatus.NOT_FOUND, "no such page")
 
-    def _save(self, text: str, digest: str) -> None:
-        try:
-            self.server.file.save(text, digest)
-        except OSError as error:
-            reason = f"{error.filename or self.server.file.case}: {error.strerror or error}"
-            raise RefusedError(
-                HTTPStatus.INTERNAL_SERVER_ERROR,
-                f"The file was not saved and has its earlier content ({reason}). The text is still in this page.",
-            ) from error
-
     def _start(self, kind: str) -> None:
-        """Start a long computation of the saved file."""
         server = self.server
         text = server.file.text()
         gearbox = server.analyst.check(text).gearbox
@@ -222,7 +217,6 @@ class Handler(BaseHTTPRequestHandler):
         server.work.start(kind, digest_of(text))
 
     def _content(self) -> dict[str, Any]:
-        """Read the JSON object of a request."""
         if self.headers.get_content_type() != "application/json":  # a form of another page cannot send it
             raise RefusedError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "content must be JSON")
         length = self.headers.get("Content-Length", "")
@@ -252,14 +246,6 @@ class Handler(BaseHTTPRequestHandler):
 
     def _send_json(self, content: Mapping[str, Any], status: HTTPStatus = HTTPStatus.OK) -> None:
         self._send(json.dumps(content).encode(), "application/json", status)
-
-    def _send_steps(self, steps: Generator[Mapping[str, Any]]) -> None:
-        """Send each step as a line as soon as it is known; the rest is not computed for a page that has gone."""
-        with closing(steps):
-            self._begin("application/x-ndjson", HTTPStatus.OK, {})
-            for step in steps:
-                self.wfile.write(json.dumps(step).encode() + b"\n")
-                self.wfile.flush()
 
     def log_message(self, format: str, *args: Any) -> None:
         """Print nothing."""

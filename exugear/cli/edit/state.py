@@ -84,13 +84,7 @@ class CheckedText:
 
 
 class Analyst:
-    """Results of texts of one gearbox file; results of the last texts are kept.
-
-    Parameters
-    ----------
-    source : path of the file, for messages and for the files that it names
-    permissions : of the file; scripts are never run
-    """
+    """Results of texts of one gearbox file, whose scripts are never run; results of the last texts are kept."""
 
     def __init__(self, source: str | Path, permissions: Permissions = NOTHING_MORE) -> None:
         self._source = str(source)
@@ -253,7 +247,6 @@ def kinematics(gearbox: Gearbox) -> dict[str, Any]:
 
 
 def _family(gearbox: Gearbox, name: str) -> str:
-    """Return the section of a body."""
     body = gearbox.named_bodies.get(name)
     return name if body is None else body.family
 

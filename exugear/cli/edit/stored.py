@@ -39,12 +39,7 @@ class FileConflictError(Exception):
 
 
 class EditedFile:
-    """A gearbox file that a page edits and that other programs may change.
-
-    Parameters
-    ----------
-    case, folder : gearbox file and results folder
-    """
+    """A gearbox file that a page edits and that other programs may change."""
 
     def __init__(self, case: Path, folder: Path) -> None:
         self.case = case
@@ -63,7 +58,18 @@ class EditedFile:
     def told(self) -> dict[str, Any]:
         """Return digest and state of the file, and of what kinds of results its folder has those of which state."""
         text = self.text()
-        return {"digest": digest_of(text), "missing": not self.case.is_file(), "results": self._results(text)}
+        # "current" results were completed for this text, "old" are others that exist.
+        try:
+            content = content_digest(tomllib.loads(text))
+        except (ValueError, TypeError, RecursionError):  # no TOML, or a date
+            content = ""
+        spent = times_spent(self.folder)
+        states: dict[str, str] = {}
+        for kind, steps in STEPS_OF_RESULTS.items():
+            digests = [own.content for own in spent if own.step.startswith(steps)]
+            if digests and (kind != "report" or (self.folder / REPORT_FILE).is_file()):
+                states[kind] = "current" if content and content in digests else "old"
+        return {"digest": digest_of(text), "missing": not self.case.is_file(), "results": states}
 
     def save(self, text: str, digest: str) -> None:
         """Write the file, whose content the page knows by its digest; line ends stay those of the file.
@@ -108,20 +114,6 @@ class EditedFile:
             return path.read_bytes()
         except (NamedFileError, OSError):
             return None
-
-    def _results(self, text: str) -> dict[str, str]:
-        """Return "current" for each kind of results that was completed for this text, "old" for others that exist."""
-        try:
-            content = content_digest(tomllib.loads(text))
-        except (ValueError, TypeError, RecursionError):  # no TOML, or a date
-            content = ""
-        spent = times_spent(self.folder)
-        states: dict[str, str] = {}
-        for kind, steps in STEPS_OF_RESULTS.items():
-            digests = [own.content for own in spent if own.step.startswith(steps)]
-            if digests and (kind != "report" or (self.folder / REPORT_FILE).is_file()):
-                states[kind] = "current" if content and content in digests else "old"
-        return states
 
 
 @contextmanager

@@ -73,13 +73,7 @@ def _reason(lines: list[str]) -> str:
 
 
 class LongWork:
-    """Long computations of one gearbox file, one at a time.
-
-    Parameters
-    ----------
-    case, folder : gearbox file and results folder
-    allow_dir : another folder whose files the gearbox file may name
-    """
+    """Long computations of one gearbox file, one at a time."""
 
     def __init__(self, case: Path, folder: Path, allow_dir: Path | None = None) -> None:
         self._case = case
@@ -141,7 +135,6 @@ class LongWork:
 
 
 def _begun(arguments: list[str]) -> subprocess.Popen[str]:
-    """Start a command of this program."""
     program = "from exugear.cli.app import main; main()"
     return subprocess.Popen(
         # -P: modules in the current folder, which may be a stranger's, are not imported.
@@ -178,7 +171,6 @@ def _follow(task: LongTask, others: list[list[str]]) -> None:
 
 
 def _interrupt(process: subprocess.Popen[str]) -> None:
-    """Ask a command to stop."""
     if sys.platform == "win32":
         process.terminate()
     else:

@@ -34,7 +34,12 @@ from exugear.transient.runup import BAND
 
 def check(case: Path, allow_dir: Path | None, as_json: bool, whole: bool) -> None:
     """Check a gearbox file and print its summary."""
-    gearbox = _read(case, allow_dir, as_json)
+    try:
+        gearbox = read_gearbox(case, allow_dir, tell=False)
+    except BadInputError as error:
+        if as_json and isinstance(error.__cause__, GearboxFileError):
+            print_json({"case": str(case), "errors": list(error.__cause__.errors)})
+        raise
     summary = summarise(gearbox)
     # A wrong sign of a torque has consequences among the other warnings: seals and bearings that turn too fast.
     warnings = [f"load_cases.{own['load_case']}: {line}" for own in summary["load_cases"] for line in own["doubts"]]
@@ -47,16 +52,6 @@ def check(case: Path, allow_dir: Path | None, as_json: bool, whole: bool) -> Non
         findings=[*(Finding("warning", line) for line in warnings), *_opposed_bearings(gearbox)],
         remarks=[*summary["matrices"], *availability(summary)],
     ).show(as_json, whole)
-
-
-def _read(case: Path, allow_dir: Path | None, as_json: bool) -> Gearbox:
-    """Read the file; if it has errors and JSON is requested, print them as an object, too."""
-    try:
-        return read_gearbox(case, allow_dir, tell=False)
-    except BadInputError as error:
-        if as_json and isinstance(error.__cause__, GearboxFileError):
-            print_json({"case": str(case), "errors": list(error.__cause__.errors)})
-        raise
 
 
 def _opposed_bearings(gearbox: Gearbox) -> Iterator[Finding]:
@@ -90,20 +85,35 @@ def summarise(gearbox: Gearbox) -> dict[str, Any]:
     variants = {str(variant): lacking(gearbox, variant) for variant in OFFERED}
     assemblies = _assemblies(gearbox, variants)
     bearings, doubts = _bearing_summaries(gearbox, assemblies.get(Variant.bushing))
+    assembly = assemblies.get(Variant.bushing) or assemblies.get(Variant.rigid)
+    if isinstance(assembly, Assembly):
+        doubts += filter(None, [unusual_damping(modes_of(assembly))])
     return {
         "case": gearbox.source,
         "name": gearbox.name,
         "ratio": gearbox.train.ratio,
         "pairs": pairs,
         "tooth_thickness": thickness_summaries(gearbox),
-        "forces": _force_summaries(gearbox),
+        "forces": [
+            {
+                "force": force.name,
+                "body": force.body,
+                "z_mm": 1e3 * force.position[2],
+                "force_N": list(force.wrench[:3]),
+                "moment_N_m": list(force.wrench[3:]),
+            }
+            for force in gearbox.forces
+        ],
         "bearings": bearings,
         "load_cases": loads,
         "variants": variants,
-        "steady": _steady_lacks(assemblies),
+        "steady": {
+            str(variant): str(assembly) if isinstance(assembly, FailedError) else steady_lack(assembly, variant)
+            for variant, assembly in assemblies.items()
+        },
         "matrices": list(external_facts(gearbox)),
         "life": {verb: list(reasons) for verb, reasons in missing_for_life(gearbox).items()},
-        "warnings": [*gearbox_warnings(gearbox), *doubts, *_damping_warnings(assemblies)],
+        "warnings": [*gearbox_warnings(gearbox), *doubts],
     }
 
 
@@ -119,22 +129,6 @@ def _assemblies(gearbox: Gearbox, variants: Mapping[str, str]) -> dict[Variant, 
         except FailedError as error:
             found[variant] = error
     return found
-
-
-def _steady_lacks(assemblies: Mapping[Variant, Assembly | FailedError]) -> dict[str, str]:
-    """Return for each variant why it has no steady-state response over speed; empty if it has one."""
-    return {
-        str(variant): str(assembly) if isinstance(assembly, FailedError) else steady_lack(assembly, variant)
-        for variant, assembly in assemblies.items()
-    }
-
-
-def _damping_warnings(assemblies: Mapping[Variant, Assembly | FailedError]) -> list[str]:
-    """Return warnings about modes with unusual damping, for rigid bodies with the mesh stiffness of ISO 6336-1."""
-    assembly = assemblies.get(Variant.bushing) or assemblies.get(Variant.rigid)
-    if assembly is None or isinstance(assembly, FailedError):
-        return []
-    return list(filter(None, [unusual_damping(modes_of(assembly))]))
 
 
 def pair_summary(gearbox: Gearbox, name: str) -> dict[str, Any]:
@@ -175,20 +169,6 @@ def thickness_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
                 }
             )
     return summaries
-
-
-def _force_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
-    """Summarise the constant forces on bodies."""
-    return [
-        {
-            "force": force.name,
-            "body": force.body,
-            "z_mm": 1e3 * force.position[2],
-            "force_N": list(force.wrench[:3]),
-            "moment_N_m": list(force.wrench[3:]),
-        }
-        for force in gearbox.forces
-    ]
 
 
 def _bearing_summaries(
@@ -359,10 +339,6 @@ def _dominant_estimate(bearing: Mapping[str, Any]) -> str:
     return re.sub(r"_(mm|um|deg|kN)$", "", key).replace("_", " ")
 
 
-def _radial_load(bearing: Mapping[str, Any]) -> str:
-    return significant(bearing["radial_load_kN"], 3) + "*" * (bearing["reaction_kN"] is not None)
-
-
 def _reaction(bearing: Mapping[str, Any]) -> str:
     key = "radial_load_kN" if bearing["reaction_kN"] is None else "reaction_kN"
     return significant(bearing[key], 3)
@@ -370,7 +346,9 @@ def _reaction(bearing: Mapping[str, Any]) -> str:
 
 BEARINGS = (
     Column("bearing", "bearing"),
-    Column("radial\nload kN", _radial_load),
+    Column(
+        "radial\nload kN", lambda own: significant(own["radial_load_kN"], 3) + "*" * (own["reaction_kN"] is not None)
+    ),
     Column("static\nreact. kN", _reaction),
     Column("axial\nload kN", "axial_load_kN", lambda load: significant(round(load, 3), 3, 2)),
     Column("radial\nstiffness\nGN/m", "radial_stiffness_N_per_m", partial(significant, digits=3, decimals=5), 1e-9),

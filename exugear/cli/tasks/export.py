@@ -13,10 +13,10 @@ from exugear.cli.case import read_gearbox
 from exugear.cli.console import BadInputError
 from exugear.cli.tables import Column, Outcome, Table
 from exugear.cli.watched import open_project
+from exugear.gearbox.choice import choice_of
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
-from exugear.report.findings.context import choice_of
 from exugear.results.findings import Finding
 from exugear.results.interface_loads import interface_loads, loaded_seats, loads_csv, nastran_loads
 from exugear.results.sound.radiated_power import radiating_names
@@ -238,7 +238,6 @@ def write_together(folder: Path, contents: Mapping[str, bytes]) -> None:
 
 
 def _refuse_existing(folder: Path, names: Iterable[str]) -> None:
-    """Refuse to replace files."""
     if existing := next((folder / name for name in names if (folder / name).exists()), None):
         raise BadInputError(f"{existing}: exists already; specify another folder with --to")
 

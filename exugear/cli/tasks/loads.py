@@ -31,24 +31,19 @@ def loads(gearbox: Gearbox, out: Path | None, as_json: bool, whole: bool) -> Non
     draw_duration(counted.distribution, counted.body, picture)
     files = [*write_spectra(counted, folder), picture]
     summary = {"case": gearbox.source, **counted.summary(), "files": [str(path) for path in files]}
+    exponent, torque = max(summary["equivalent_torque_kN_m"].items(), key=lambda own: float(own[0]))
+    largest = max(source["largest_torque_kN_m"] for source in summary["sources"])
+    unit, factor = _torque_unit(summary)
     Outcome(
-        verdict=_verdict(summary),
+        verdict=(
+            f"Torque on {summary['body']}: equivalent {_three(factor * torque)} {unit} (m = {exponent}), "
+            f"largest {_three(factor * largest)} {unit}, {summary['hours']:,.0f} h"
+        ),
         summary=summary,
         tables=load_tables(summary, len(counted.distribution.hours)),
         findings=[Finding("warning", line) for line in summary["remarks"]],
         path=folder,
     ).show(as_json, whole)
-
-
-def _verdict(summary: Mapping[str, Any]) -> str:
-    """Return the damage-equivalent torque with the largest S-N exponent m."""
-    exponent, torque = max(summary["equivalent_torque_kN_m"].items(), key=lambda own: float(own[0]))
-    largest = max(source["largest_torque_kN_m"] for source in summary["sources"])
-    unit, factor = _torque_unit(summary)
-    return (
-        f"Torque on {summary['body']}: equivalent {_three(factor * torque)} {unit} (m = {exponent}), "
-        f"largest {_three(factor * largest)} {unit}, {summary['hours']:,.0f} h"
-    )
 
 
 _three = partial(significant, digits=3)

@@ -54,8 +54,14 @@ def losses(project: WatchedProject, speed: float | None, efficiency_map: bool, a
     summary = {"case": gearbox.source, **summarise(found), "map": []}
     if efficiency_map:
         summary["map"] = _mapped(project, tables, chosen)
+    losses = f"{_kilowatts(summary['losses_W'])} kW"
+    if summary["losses_band_W"][0] < summary["losses_band_W"][1]:
+        losses += f" ({_band(summary['losses_band_W'], 3)})"
     Outcome(
-        verdict=_verdict(summary),
+        verdict=(
+            f"Efficiency {100.0 * summary['efficiency']:.1f} %: input {_kilowatts(summary['input_power_W'])} kW, "
+            f"losses {losses}, oil {summary['oil_temperature_C']:.0f} °C"
+        ),
         summary=summary,
         tables=_tables(static_load_in_words(gearbox), summary),
         findings=list(_findings(summary)),
@@ -174,17 +180,6 @@ PARTS = (
     _detail("series", "series"),
     _detail("diameter\nmm", "diameter_mm", "g"),
 )
-
-
-def _verdict(summary: Mapping[str, Any]) -> str:
-    """Return the efficiency and the power balance."""
-    losses = f"{_kilowatts(summary['losses_W'])} kW"
-    if summary["losses_band_W"][0] < summary["losses_band_W"][1]:
-        losses += f" ({_band(summary['losses_band_W'], 3)})"
-    return (
-        f"Efficiency {100.0 * summary['efficiency']:.1f} %: input {_kilowatts(summary['input_power_W'])} kW, losses "
-        f"{losses}, oil {summary['oil_temperature_C']:.0f} °C"
-    )
 
 
 def _tables(load: str, summary: Mapping[str, Any]) -> list[Table]:

@@ -63,7 +63,12 @@ def measured(
             fit = project.fit_measured(comparison, keys, method)
         except FitError as error:  # the comparison is valid without a fit
             failure = f"fit: {error}"
-    lines = _fit_lines(fit)
+    lines = [
+        f"Fit: {own.key} is not determined ({own.refusal})"
+        if own.refusal
+        else f"Fit: {own.key} = {own.value:.4g} ({own.low:.4g} to {own.high:.4g}, 95 %), {own.start:.4g} in the file"
+        for own in (fit.parameters if fit is not None else ())
+    ]
     if copy is not None and fit is not None:
         try:
             project.gearbox.write_copy(copy, fit.changes)
@@ -80,7 +85,15 @@ def measured(
         ],
         summary={**summary, **({"fit": fitted_parameters(fit)} if fit else {}), "file": str(path)},
         tables=measured_tables(summary),
-        findings=[*comparison.findings, *_undetermined(fit), *_unnoticed()],
+        findings=[
+            *comparison.findings,
+            *_undetermined(fit),
+            Finding(
+                "note",
+                "not noticeable: peak for rms (3 dB), an amplifier that clips before its anti-aliasing filter; an "
+                "accelerometer on a cover is not the seat of a bearing",
+            ),
+        ],
         path=f"{path}, CSV tables, {path.with_suffix('.png').name}",
         failure=failure,
     ).show(as_json, whole)
@@ -108,16 +121,6 @@ def fitted_parameters(fit: ParameterFit) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _fit_lines(fit: ParameterFit | None) -> list[str]:
-    """Return one line for each fitted parameter."""
-    return [
-        f"Fit: {own.key} is not determined ({own.refusal})"
-        if own.refusal
-        else f"Fit: {own.key} = {own.value:.4g} ({own.low:.4g} to {own.high:.4g}, 95 %), {own.start:.4g} in the file"
-        for own in (fit.parameters if fit is not None else ())
-    ]
-
-
 def _undetermined(fit: ParameterFit | None) -> list[Finding]:
     """Return what a fit says, and what it assumes."""
     if fit is None:
@@ -129,17 +132,6 @@ def _undetermined(fit: ParameterFit | None) -> list[Finding]:
     return [
         Finding(
             "note", f"{text}; all other values are those of the file, such as inertias: errors of them shift the fit"
-        )
-    ]
-
-
-def _unnoticed() -> list[Finding]:
-    """Return what the comparison cannot notice."""
-    return [
-        Finding(
-            "note",
-            "not noticeable: peak for rms (3 dB), an amplifier that clips before its anti-aliasing filter; an "
-            "accelerometer on a cover is not the seat of a bearing",
         )
     ]
 

@@ -13,7 +13,7 @@ from exugear.cli.watched import WatchedProject
 from exugear.results.findings import Finding
 from exugear.results.spectra.run_spectra import report_mode
 from exugear.system.modal_damping import damping_in_words
-from exugear.system.modes import VISIBLE, Modes, unusual_damping
+from exugear.system.modes import VISIBLE, unusual_damping
 from exugear.system.statics import meshes_near_unconverged
 from fe_ste.tools.drawing import drawing_style, finish_figure, new_figure
 
@@ -30,14 +30,31 @@ def modes(project: WatchedProject, as_json: bool, whole: bool) -> None:
     found = project.modes()
     path = project.modes_path
     assembly = found.assembly
+    data = found.to_dataset()
+    with drawing_style():
+        figure = new_figure(7.2, 5.0)
+        found.plot(ax=figure.add_subplot())
+        figure.suptitle(f"{found.label}\nModes with more than {100 * VISIBLE:g} % TE participation", fontsize=9.5)
+        picture = path.with_name("campbell.png")
+        finish_figure(figure, picture)
     summary: dict[str, Any] = {
         "case": project.gearbox.source,
         "variant": assembly.variant,
         "mesh_model": assembly.mesh_model,
         "inertias": assembly.inertias,
-        "modes": mode_summaries(found),
+        "modes": [
+            {
+                "mode": mode.index + 1,
+                "frequency_Hz": mode.frequency,
+                "damping_ratio": mode.damping_ratio,
+                "te_participation": mode.share,
+                "amplification": mode.amplification,
+                "name": mode.name,
+            }
+            for mode in (report_mode(data, index) for index in range(len(found.names)))
+        ],
         "file": str(path),
-        "picture": str(_draw_campbell(found, path)),
+        "picture": str(picture),
     }
     findings = []
     if found.growth_rate > 0.0:
@@ -54,33 +71,6 @@ def modes(project: WatchedProject, as_json: bool, whole: bool) -> None:
         failure=not_converged_failure(meshes_near_unconverged(assembly)),
         remarks=[f"Housing stiffness factor {assembly.housing_factor:g}; damping {damping}."],
     ).show(as_json, whole)
-
-
-def mode_summaries(found: Modes) -> list[dict[str, Any]]:
-    """Summarise each mode."""
-    data = found.to_dataset()
-    return [
-        {
-            "mode": mode.index + 1,
-            "frequency_Hz": mode.frequency,
-            "damping_ratio": mode.damping_ratio,
-            "te_participation": mode.share,
-            "amplification": mode.amplification,
-            "name": mode.name,
-        }
-        for mode in (report_mode(data, index) for index in range(len(found.names)))
-    ]
-
-
-def _draw_campbell(found: Modes, path: Path) -> Path:
-    """Draw the Campbell diagram of modes with participation in the overall transmission error next to their file."""
-    with drawing_style():
-        figure = new_figure(7.2, 5.0)
-        found.plot(ax=figure.add_subplot())
-        figure.suptitle(f"{found.label}\nModes with more than {100 * VISIBLE:g} % TE participation", fontsize=9.5)
-        picture = path.with_name("campbell.png")
-        finish_figure(figure, picture)
-    return picture
 
 
 def _elastic(key: str) -> Any:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Executor
-from contextlib import AbstractContextManager, nullcontext, suppress
+from contextlib import nullcontext, suppress
 from dataclasses import asdict, dataclass, replace
 from operator import attrgetter
 from pathlib import Path
@@ -20,14 +19,14 @@ from exugear.cli.console import (
 from exugear.cli.resonances import highest_resonance, resonance_table
 from exugear.cli.tables import Column, Outcome, Table
 from exugear.cli.watched import WatchedProject
-from exugear.gearbox.choice import Choice
+from exugear.gearbox.choice import Choice, choice_of
 from exugear.gearbox.named_files import Permissions
 from exugear.gearbox.reading import GearboxFileError, read_toml
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.project import default_folder, results_folder
 from exugear.report.design_study import at_load
-from exugear.report.findings.context import ReportError, choice_of
+from exugear.report.findings.context import ReportError
 from exugear.report.findings.design_changes import LEAST_DB, DesignStudy, settings_of_study
 from exugear.report.findings.other_design import check_ranges
 from exugear.report.findings.words import QUANTITIES
@@ -78,14 +77,25 @@ def report(
     if other is not None and not other.is_dir():
         raise BadInputError(f"{other}: --compare: no such folder; specify the results folder of another design")
     if other is not None:
-        _check_comparison(folder, other, allow_dir)
+        # Another design that cannot be compared is refused before anything is computed.
+        permissions = Permissions(below=allow_dir)
+        own = read_stored_gearbox(folder, permissions)
+        others = read_stored_gearbox(other, permissions)
+        try:
+            check_ranges(own, others)
+        except ReportError as error:
+            raise BadInputError(error) from error
     if not stored:
         _compute_missing(folder, allow_dir)
     study = None
     if changes.levers:
         study = _design_changes(folder, allow_dir, changes)
     try:
-        with time_noted(folder, "report"), progress_bar() as bar, _parallel_worker() as executor:
+        with (
+            time_noted(folder, "report"),
+            progress_bar() as bar,
+            Workers(1) if available_cores() > 1 else nullcontext() as executor,
+        ):
             task = bar.add_task("report", total=None)
 
             def tell(what: str) -> None:
@@ -110,17 +120,6 @@ def _changed_since(folder: Path) -> list[Finding]:
         return []
     text = f"{source.name} has changed since these results were computed; for the present one: exugear steady {source}"
     return [Finding("warning", text)]
-
-
-def _check_comparison(folder: Path, other: Path, allow_dir: Path | None) -> None:
-    """Refuse another design that cannot be compared, before anything is computed."""
-    permissions = Permissions(below=allow_dir)
-    own = read_stored_gearbox(folder, permissions)
-    others = read_stored_gearbox(other, permissions)
-    try:
-        check_ranges(own, others)
-    except ReportError as error:
-        raise BadInputError(error) from error
 
 
 def _compute_missing(folder: Path, allow_dir: Path | None) -> None:
@@ -204,13 +203,6 @@ def _results_of(folder: Path) -> Path:
     return below
 
 
-def _parallel_worker() -> AbstractContextManager[Executor | None]:
-    """Return a second worker process if a core is available for it; the process starts with its first task."""
-    if available_cores() > 1:
-        return Workers(1)
-    return nullcontext()
-
-
 def _outcome(folder: Path, written: Report, study: DesignStudy | None) -> Outcome:
     spent = times_spent(folder)
     lists = {name: list(getattr(written, name)) for name in ("statements", "resonances", "missing", "left_out")}
@@ -228,7 +220,10 @@ def _outcome(folder: Path, written: Report, study: DesignStudy | None) -> Outcom
     findings += [Finding("warning", f"skipped: {line}") for line in written.left_out]
     if study is not None:
         tables.insert(0, _changes(study))
-        findings += _unmet(study)
+    if study is not None and study.requirements:
+        more = f"; and {len(study.requirements) - 1} more" if len(study.requirements) > 1 else ""
+        text = f"requirements that the unchanged gearbox does not meet: {study.requirements[0]}{more}"
+        findings.append(Finding("warning", text))
     checks = {f"{finding.line}." for finding in written.findings}
     return Outcome(
         verdict=verdict,
@@ -274,15 +269,6 @@ def _changes(study: DesignStudy) -> Table:
     title += f", {study.line}, dB; loads: {', '.join(study.loads)}"
     legend = "here: this peak; range: highest amplitude of any order. Rated: changes that are recommended otherwise."
     return Table(title, rows, columns, legend, noun="changes")
-
-
-def _unmet(study: DesignStudy) -> list[Finding]:
-    """Return a warning about requirements that the unchanged gearbox does not meet."""
-    if not study.requirements:
-        return []
-    more = f"; and {len(study.requirements) - 1} more" if len(study.requirements) > 1 else ""
-    text = f"requirements that the unchanged gearbox does not meet: {study.requirements[0]}{more}"
-    return [Finding("warning", text)]
 
 
 def _decibels(value: float) -> str:

@@ -48,7 +48,11 @@ def run(
     """Compute, store and print the run of a project; `command` resumes it."""
     if resume:
         duration = _duration_to_resume(project, duration)
-    kept = _kept_band(project, band, resume)
+    if band is None and resume:
+        band = kept_band(project.run_directory)
+    if band is None:
+        band = BAND
+    kept = {"band": band, "sample_rate": rate_for(band)}
     _check_extent(project, duration, kept["sample_rate"])
     _check_solver(project, solver, mesh_route)
     if compared is not None:
@@ -83,7 +87,6 @@ def run(
 
 
 def _compare(project: Project, duration: float, kept: Mapping[str, float]) -> SolverComparison:
-    """Integrate the beginning of the run with Exudyn."""
     try:
         return project.compare_with_exudyn(duration, **kept)
     except (RunError, LimitError, FileError) as error:
@@ -95,15 +98,6 @@ def load_case_of(project: Project) -> LoadCase:
     if project.choice.load_case is None:
         raise BadInputError(project.gearbox.error("no load case; add a section [load_cases.NAME]"))
     return project.gearbox.load_cases[project.choice.load_case]
-
-
-def _kept_band(project: Project, band: float | None, resume: bool) -> dict[str, float]:
-    """Return the requested band, or that of the stopped run, and the required sample rate, Hz."""
-    if band is None and resume:
-        band = kept_band(project.run_directory)
-    if band is None:
-        band = BAND
-    return {"band": band, "sample_rate": rate_for(band)}
 
 
 def _check_extent(project: Project, duration: float | None, sample_rate: float) -> None:
@@ -192,13 +186,7 @@ def _simulate(project: Project, resume: bool, command: str, **options: Any) -> R
 def _outcome(
     case: str, finished: Run, comparison: SolverComparison | None, command: str, said: Collection[str]
 ) -> Outcome:
-    """Return what is printed of a run; end with code 130 if the user stopped it.
-
-    Parameters
-    ----------
-    command : resumes the run
-    said : warnings that were printed before it
-    """
+    """Return what is printed of a run, but for warnings that were said before; end with code 130 if it was stopped."""
     if not finished.complete and not finished.halted:
         so_far = "".join(f"\nInvalid so far: {reason}" for reason in finished.reasons)
         raise StoppedError(

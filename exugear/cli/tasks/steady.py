@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
@@ -22,6 +21,7 @@ from exugear.project import Project
 from exugear.report.findings.context import METHOD_LABELS
 from exugear.report.findings.ranking import Ranking, ranking_of
 from exugear.results.findings import Finding
+from exugear.results.folder import finite_or_none
 from exugear.results.sound.over_speed import sound_over_speed
 from exugear.results.sound.radiated_power import radiating_names
 from exugear.steady.findings import LEAST_AMPLITUDE, is_excited, response_findings, shuttling_findings
@@ -72,16 +72,6 @@ def settings_of_options(
     return SteadySettings(speeds, method, harmonics, branches=branches)
 
 
-def check_radiating_body(project: Project) -> None:
-    """Refuse a ranking by sound power without a flexible housing, before anything is computed."""
-    if not radiating_names(project.gearbox, project.choice.variant):
-        raise BadInputError(
-            f"--quantity sound_power: the variant {project.choice.variant} has no flexible housing; use --variant "
-            'flexible, and give a fixed body a [bodies.NAME.solid] table and flexibility = "elastic" '
-            "([bodies.NAME.external] needs recovery, the file of its surface)"
-        )
-
-
 def steady(project: WatchedProject, settings: SteadySettings, quantity: str | None, as_json: bool, whole: bool) -> None:
     """Compute, store and print the response of a project."""
     gearbox = project.gearbox
@@ -91,8 +81,12 @@ def steady(project: WatchedProject, settings: SteadySettings, quantity: str | No
         with suppress(FailedError):  # such a failure does not apply to the selected mesh model
             if reason := steady_lack(assembled_by_iso(gearbox, variant), variant):
                 raise BadInputError(reason)
-    if quantity == "sound_power":
-        check_radiating_body(project)
+    if quantity == "sound_power" and not radiating_names(gearbox, variant):
+        raise BadInputError(
+            f"--quantity sound_power: the variant {variant} has no flexible housing; use --variant flexible, and give "
+            'a fixed body a [bodies.NAME.solid] table and flexibility = "elastic" ([bodies.NAME.external] needs '
+            "recovery, the file of its surface)"
+        )
     check_friction(gearbox, project.choice.mesh_model)
     project.begin()
     project.prepare()
@@ -138,6 +132,8 @@ def summarise(
     """Summarise a response, with units in the keys."""
     law = LAWS[str(data.attrs["mesh_model"])]
     excited = is_excited(data)
+    # planets by their family
+    shares = zip(data["mesh_wave"].values, data["left_out"].values, strict=True)
     return {
         "case": project.gearbox.source,
         **{key: str(data.attrs[key]) for key in ("variant", "mesh_model", "inertias", "method")},
@@ -147,8 +143,8 @@ def summarise(
         "growth_rate_1_per_s": float(data.attrs["growth_rate"]),
         "excited": excited,
         "harmonics": int(data.attrs["harmonics"]),
-        "truncation_of_compliance": _left_out(data),
-        "change_with_more_harmonics": _known(float(data.attrs["change_with_more"])),
+        "truncation_of_compliance": {str(wave): float(share) for wave, share in shares if " " not in str(wave)},
+        "change_with_more_harmonics": finite_or_none(float(data.attrs["change_with_more"])),
         "meshes_that_pull": [
             {"mesh": pull.mesh, "speeds": pull.count, "worst_speed_rpm": pull.speed / RPM, "share_of_time": pull.share}
             for pull in (() if law.loses_contact else pulls(data))
@@ -213,22 +209,10 @@ def neglected_shuttling(project: Project) -> tuple[Shuttling, ...]:
     return shuttling_pairs(project.gearbox, project.folder)
 
 
-def _left_out(data: xr.Dataset) -> dict[str, float]:
-    """Neglected fraction of the compliance variation of each mesh, above the harmonics; planets by their family."""
-    shares = zip(data["mesh_wave"].values, data["left_out"].values, strict=True)
-    return {str(wave): float(share) for wave, share in shares if " " not in str(wave)}
-
-
 def _sound(data: xr.Dataset, ranking: Ranking) -> dict[str, Any] | None:
     """Return the loudest speed among those that are ranked; None without an elastic housing."""
     sound = sound_over_speed(data)
     return None if sound is None else sound.inside(ranking.speeds).summary()
-
-
-def _known(value: float) -> float | None:
-    if math.isfinite(value):
-        return value
-    return None
 
 
 def _other_loads(gearbox: Gearbox) -> Iterator[Finding]:

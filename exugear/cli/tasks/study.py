@@ -74,8 +74,9 @@ def study(
     except (ExecutorError, OptimisationError) as error:
         raise FailedError(error) from error
     summary = summarise(read, result, _draw(read, folder, result))
+    finished = f"{summary['finished']} of {summary['points']} points finished"
     Outcome(
-        verdict=_verdict(read, summary),
+        verdict=f"{read.file.name}: {finished}, {summary['computed']} computed now",
         summary=summary,
         tables=_tables(read, result.dataset),
         findings=list(_findings(read, result, summary)),
@@ -136,7 +137,6 @@ def read_study(path: Path, allow_dir: Path | None, scripts: bool) -> Study:
 
 
 def _run(study: Study, folder: Path, opens: Opens, shard: Shard, merge: bool, retry: bool) -> StudyResult:
-    """Run the study with a progress bar."""
     with progress_bar() as bar:
         task = bar.add_task("points", total=None)
         first: list[int] = []
@@ -154,7 +154,6 @@ def _run(study: Study, folder: Path, opens: Opens, shard: Shard, merge: bool, re
 
 
 def _draw(study: Study, folder: Path, swept: StudyResult) -> list[Path]:
-    """Plot the combined results."""
     if swept.dataset is None:
         return []
     search = study.file.optimise
@@ -182,11 +181,6 @@ def summarise(study: Study, swept: StudyResult, pictures: list[Path]) -> dict[st
         "file": None if swept.path is None else str(swept.path),
         "pictures": [str(picture) for picture in pictures],
     }
-
-
-def _verdict(study: Study, summary: dict[str, Any]) -> str:
-    finished = f"{summary['finished']} of {summary['points']} points finished"
-    return f"{study.file.name}: {finished}, {summary['computed']} computed now"
 
 
 def _findings(study: Study, swept: StudyResult, summary: dict[str, Any]) -> Iterator[Finding]:

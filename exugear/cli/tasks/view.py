@@ -115,12 +115,7 @@ def _draw(
     resonance: int | None,
     animation: bool,
 ) -> tuple[list[Path], int | None]:
-    """Write the page of all elastic modes and resonances, and pictures of what it shows first.
-
-    Returns
-    -------
-    files, and the number of the resonance that is shown first; None for a mode
-    """
+    """Write page and pictures; return them and the number of the resonance that is shown first, None for a mode."""
     assembly = modes.assembly
     words = Labels(assembly.gearbox)
     ranked: tuple[Resonance, ...] = ()

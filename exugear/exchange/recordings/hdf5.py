@@ -109,13 +109,11 @@ def _datasets(path: Path, group: h5py.Group, before: str = "", depth: int = 0) -
         item = group[name]
         if isinstance(item, h5py.Group) and depth < _DEEPEST:
             yield from _datasets(path, item, f"{before}{name}/", depth + 1)
-        elif isinstance(item, h5py.Dataset) and _is_signal(item):
+        # one dimension, and numbers in this file itself
+        elif isinstance(item, h5py.Dataset) and (
+            len(item.shape or ()) == 1 and item.dtype.kind in "iuf" and not (item.external or item.is_virtual)
+        ):
             yield f"{before}{name}", item
-
-
-def _is_signal(data: h5py.Dataset) -> bool:
-    """Return whether a dataset has one dimension and holds its numbers in this file itself."""
-    return len(data.shape or ()) == 1 and data.dtype.kind in "iuf" and not (data.external or data.is_virtual)
 
 
 def _check_size(path: Path, name: str, data: h5py.Dataset, size: int) -> None:
@@ -152,7 +150,6 @@ def _time(path: Path, name: str, data: h5py.Dataset, times: dict[str, h5py.Datas
 
 
 def _values(data: h5py.Dataset) -> Floats:
-    """Values of a dataset, unpacked."""
     return floats(data[:]) * _factor(data, "scale_factor", 1.0) + _factor(data, "add_offset", 0.0)
 
 

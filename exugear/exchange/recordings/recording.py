@@ -1,8 +1,4 @@
-"""Recording of a measurement: channels with quantity, unit and values at one rate, and the checks of all formats.
-
-All readers end in `recording_of`, so that every format is checked in the same way: channels of equal length, values
-that are numbers, and enough of them.
-"""
+"""Recording of a measurement: channels with quantity, unit and values at one rate, and the checks of all formats."""
 
 from __future__ import annotations
 

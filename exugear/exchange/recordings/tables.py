@@ -48,11 +48,7 @@ class _Headings:
 
 
 def read_table(path: Path, wanted: Sequence[str] | None = None) -> Recording:
-    """Channels of a comma-separated table.
-
-    Parameters
-    ----------
-    wanted : names of the channels, without their units; all by default
+    """Channels of a comma-separated table: those of wanted names (without units), or all.
 
     Raises
     ------

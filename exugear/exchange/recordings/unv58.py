@@ -88,14 +88,10 @@ class _SetHeader:
 
 
 def read_unv(path: Path, wanted: Sequence[str] | None = None) -> Recording:
-    """Time signals of the data sets 58 of a universal file.
+    """Time signals of the data sets 58 of a universal file: those of wanted names, or all.
 
     A channel has the name of the first line of identification; where this is missing or not unique, that of its degree
     of freedom, such as ``HOUSING 3:+Z``.
-
-    Parameters
-    ----------
-    wanted : names of the channels; all by default
 
     Raises
     ------

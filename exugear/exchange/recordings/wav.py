@@ -33,13 +33,9 @@ _MOST_CHUNKS = 10_000
 
 
 def read_wav(path: Path, wanted: Sequence[str] | None = None) -> Recording:
-    """Channels of a WAV file, named ``channel 1``, ``channel 2``, ... without units.
+    """All or the wanted channels of a WAV file, named ``channel 1``, ``channel 2``, ... without units.
 
     Integers are fractions of full scale, -1 to 1; floats are as written.
-
-    Parameters
-    ----------
-    wanted : names of the channels; all by default
 
     Raises
     ------
@@ -102,7 +98,6 @@ def _checked_header(path: Path, file: IO[bytes]) -> tuple[int, float]:
 
 
 def _chunks(path: Path, file: IO[bytes], size: int) -> Iterator[tuple[bytes, int, int]]:
-    """Yield name, position and length of each chunk."""
     head = file.read(12)
     if len(head) < 12 or head[:4] != b"RIFF" or head[8:] != b"WAVE":
         raise RecordingError(f"{path}: does not begin as a WAV file (RIFF, WAVE); check the extension")

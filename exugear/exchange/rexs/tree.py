@@ -106,7 +106,6 @@ class Component:
     type: str
     name: str = ""
     attributes: Mapping[str, Attribute] = field(default_factory=dict)
-    """Attributes by their current names."""
     asked: set[str] = field(default_factory=set, repr=False)
     """Names that have been read so far; the others are reported as omitted by an import."""
 
@@ -160,8 +159,8 @@ class Component:
         value = self.attributes[key].value if key in self.attributes else None
         return value is not None and not (isinstance(value, tuple) and len(value) == 3)
 
-    def vector(self, key: str, unit: str = "mm") -> tuple[float, float, float] | None:
-        """Three numbers in a unit; None if the file has no value.
+    def vector(self, key: str) -> tuple[float, float, float] | None:
+        """Three numbers in mm; None if the file has no value.
 
         Raises
         ------
@@ -173,7 +172,7 @@ class Component:
             return None
         if not isinstance(attribute.value, tuple) or len(attribute.value) != 3:
             raise RexsError(f"{self}: {key} is not three numbers")
-        factor = self._factor(key, attribute, unit)
+        factor = self._factor(key, attribute, "mm")
         u, v, w = (self._number(key, value) * factor for value in attribute.value)
         return u, v, w
 

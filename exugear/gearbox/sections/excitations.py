@@ -93,7 +93,6 @@ class ExcitationSection(Section):
 
     @model_validator(mode="after")
     def _counts(self) -> ExcitationSection:
-        """Raise an error for lists of unequal length."""
         count = len(self.orders) or 1
         for key in (*AMPLITUDES, "phase_deg"):
             values = getattr(self, key)

@@ -15,11 +15,7 @@ KINDS = {
 
 
 def template(kind: str) -> str:
-    """Template gearbox file of a kind, as text.
-
-    Parameters
-    ----------
-    kind : one of `KINDS`
+    """Template gearbox file of one of `KINDS`, as text.
 
     Examples
     --------

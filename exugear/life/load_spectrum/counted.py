@@ -67,7 +67,10 @@ def tooth_exposures(gearbox: Gearbox, body: str) -> tuple[ToothExposure, ...]:
     [14.1429]
     """
     spins = gearbox.train.rolling_speeds(body, 1.0)
-    forces = gearbox.train.static_mesh_forces(_torque_on(gearbox, body))
+    if body in gearbox.case.static_load.locked:
+        held = ", ".join(gearbox.case.static_load.locked)
+        raise gearbox.error(f"loads.body = {body!r}: static_load.locked locks {held}; set the body at the other end")
+    forces = gearbox.train.static_mesh_forces({body: 1.0})
     exposures: dict[tuple[str, str, str], ToothExposure] = {}
     for mesh in gearbox.meshes:
         for member, holder in enumerate((mesh.pinion, mesh.gear)):
@@ -118,20 +121,6 @@ def bearing_turns(gearbox: Gearbox, body: str) -> dict[str, float]:
     }
 
 
-def _torque_on(gearbox: Gearbox, body: str) -> dict[str, float]:
-    """Return a torque of 1 N m on a body, with reactions where the static load has them.
-
-    Raises
-    ------
-    GearboxFileError
-        The body is one of the supports of the static load.
-    """
-    if body in gearbox.case.static_load.locked:
-        held = ", ".join(gearbox.case.static_load.locked)
-        raise gearbox.error(f"loads.body = {body!r}: static_load.locked locks {held}; set the body at the other end")
-    return {body: 1.0}
-
-
 EXPONENTS = (3.0, 10.0 / 3.0, 6.61, 8.74)
 """Slopes of S-N curves: steel structures, roller bearings, contact and bending of gears, all over torque."""
 
@@ -141,7 +130,6 @@ class CountedLoads(ReprMixin, line=" on {body!r}: {sources!n} sources, {distribu
     """Counted loads of a gearbox."""
 
     body: str
-    """Loaded body."""
     life_years: float
     sources: tuple[LoadSource, ...]
     distribution: DurationDistribution
@@ -240,12 +228,17 @@ class CountedLoads(ReprMixin, line=" on {body!r}: {sources!n} sources, {distribu
         }
 
 
+def forces_of_families(gearbox: Gearbox, body: str) -> dict[str, float]:
+    """Return the static force F_bt of mesh families at 1 N m on a body, N; the largest of each family."""
+    forces = gearbox.train.static_mesh_forces({body: 1.0})
+    families: dict[str, float] = {}
+    for mesh in gearbox.meshes:
+        families[mesh.family] = max(families.get(mesh.family, 0.0), abs(forces[mesh.name]))
+    return families
+
+
 def count_loads(gearbox: Gearbox, progress: Progress | None = None) -> CountedLoads:
     """Read and count the loads of a gearbox file.
-
-    Parameters
-    ----------
-    progress : called with the number of files read and the total
 
     Raises
     ------
@@ -256,32 +249,6 @@ def count_loads(gearbox: Gearbox, progress: Progress | None = None) -> CountedLo
     sources = load_sources(gearbox, progress)
     found = distribution(gearbox, sources)
     teeth = tooth_exposures(gearbox, loads.body)
-    forces = gearbox.train.static_mesh_forces({loads.body: 1.0})
-    families: dict[str, float] = {}
-    for mesh in gearbox.meshes:
-        families[mesh.family] = max(families.get(mesh.family, 0.0), abs(forces[mesh.name]))
-    return CountedLoads(
-        body=loads.body,
-        life_years=loads.life_years,
-        sources=sources,
-        distribution=found,
-        points=points_of(gearbox, sources, found),
-        equivalent_ranges=_equivalent_ranges(sources),
-        teeth=teeth,
-        bearings=bearing_turns(gearbox, loads.body),
-        mesh_forces=families,
-        bin_value=loads.bin_value,
-    )
-
-
-def _weights(source: LoadSource) -> Any:
-    if source.hours.sum() > 0.0:
-        return source.hours
-    return None
-
-
-def _equivalent_ranges(sources: tuple[LoadSource, ...]) -> dict[str, dict[float, float]]:
-    """Return the damage-equivalent range of each component of all fatigue series together, at one cycle per second."""
     series = [source for source in sources if source.series and source.kind == "fatigue" and source.hours.sum() > 0.0]
     hours = np.array([float(history.hours.sum()) for history in series])
     ranges: dict[str, dict[float, float]] = {}
@@ -293,7 +260,22 @@ def _equivalent_ranges(sources: tuple[LoadSource, ...]) -> dict[str, dict[float,
                 )
                 for m in RANGE_EXPONENTS
             }
-    return ranges
+    return CountedLoads(
+        body=loads.body,
+        life_years=loads.life_years,
+        sources=sources,
+        distribution=found,
+        points=points_of(gearbox, sources, found),
+        equivalent_ranges=ranges,
+        teeth=teeth,
+        bearings=bearing_turns(gearbox, loads.body),
+        mesh_forces=forces_of_families(gearbox, loads.body),
+        bin_value=loads.bin_value,
+    )
+
+
+def _weights(source: LoadSource) -> Any:
+    return source.hours if source.hours.sum() > 0.0 else None
 
 
 # Load duration distributions as CSV tables for other programs
@@ -332,14 +314,7 @@ def write_spectra(counted: CountedLoads, folder: Path) -> list[Path]:
 
 
 def draw_duration(distribution: DurationDistribution, body: str, path: str | Path | None = None) -> Figure:
-    """Draw the load duration distribution of a body: hours in each bin, and hours above each torque.
-
-    Parameters
-    ----------
-    distribution : to draw
-    body : for the labels
-    path : file for the picture
-    """
+    """Draw the load duration distribution of a body: hours in each bin, and hours above each torque."""
     with drawing_style():
         figure = new_figure(7.0, 3.2)
         bars, above = figure.subplots(1, 2)

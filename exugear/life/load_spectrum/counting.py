@@ -54,7 +54,6 @@ def load_duration(
     Parameters
     ----------
     torque, speed, hours : (samples,) N m, rad/s, and duration of each sample in the whole life
-    bins : number of bins for each sign
     largest : outer edge of the last bin, N m, if the samples represent larger torques; by default their largest torque
 
     Examples
@@ -153,12 +152,7 @@ def load_points(
 
 
 def equivalent_load(load: Floats, cycles: Floats, exponent: float) -> float:
-    """Return the constant load with the same damage in the same number of cycles, by Miner's rule with one slope.
-
-    Parameters
-    ----------
-    load : the absolute value is taken
-    exponent : slope of the S-N curve
+    """Return the constant load of equal damage in as many cycles as absolute loads, by Miner's rule with one slope.
 
     Examples
     --------
@@ -259,11 +253,7 @@ def _take(point: float, stack: list[float], closed: array[float]) -> None:
 
 
 def rainflow(series: Floats) -> tuple[Floats, Floats, Floats]:
-    """Count cycles by the rainflow method of ASTM E1049-85, 5.4.4; the residue gives half cycles.
-
-    Parameters
-    ----------
-    series : (samples,)
+    """Count cycles of a series (samples,) by the rainflow method of ASTM E1049-85, 5.4.4; the residue gives half ones.
 
     Returns
     -------
@@ -280,12 +270,6 @@ def rainflow(series: Floats) -> tuple[Floats, Floats, Floats]:
     count = Rainflow()
     count.add(np.asarray(series, dtype=np.float64))
     return count.cycles()
-
-
-def damage_equivalent_range(series: Floats, exponent: float, cycles: float) -> float:
-    """Return the range of `cycles` equal cycles with the damage of a series: see `equivalent_range`."""
-    ranges, _, counts = rainflow(series)
-    return equivalent_range(ranges, counts, exponent, cycles)
 
 
 def equivalent_range(ranges: Floats, counts: Floats, exponent: float, cycles: float) -> float:

@@ -67,11 +67,7 @@ def together(parts: list[Samples]) -> Samples:
 
 
 def condensed(samples: Samples, extreme: bool = False) -> Samples:
-    """Merge the samples of each cell.
-
-    Parameters
-    ----------
-    extreme : whether the largest loads of a cell represent it, instead of means weighted by revolutions
+    """Merge the samples of each cell: to means weighted by revolutions, or to the extreme loads.
 
     Examples
     --------

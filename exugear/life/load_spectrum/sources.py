@@ -202,10 +202,6 @@ LEAST_SHARE_BACKWARDS = 0.05
 def load_sources(gearbox: Gearbox, progress: Progress | None = None) -> tuple[LoadSource, ...]:
     """Read all sources of a gearbox file.
 
-    Parameters
-    ----------
-    progress : called with the number of files read and the total
-
     Raises
     ------
     GearboxFileError
@@ -227,7 +223,10 @@ def load_sources(gearbox: Gearbox, progress: Progress | None = None) -> tuple[Lo
             draft.take(path)
             done += 1
         drafts.append(draft)
-    by_wind = _wind_seconds(drafts)
+    by_wind: dict[float, float] = {}
+    for draft in drafts:
+        for group, pool in draft.pools.items() if draft.section.wind is not None else ():
+            by_wind[group] = by_wind.get(group, 0.0) + pool.seconds
     sources = tuple(draft.source(by_wind) for draft in drafts)
     yearly = sum(float(source.hours.sum()) for source in sources) / loads.life_years
     if yearly > HOURS_PER_YEAR * (1.0 + 1e-9):
@@ -346,7 +345,9 @@ class _SourceDraft:
             self._check_table(path)
 
     def _take_series(self, path: Path) -> None:
-        if self.section.kind == "fatigue" and not self._weighed:
+        section = self.section
+        ways = (section.hours_per_year, section.events_per_year, section.hours_table, section.wind)
+        if section.kind == "fatigue" and all(way is None for way in ways):
             raise self.gearbox.error(f"{self.key}.hours_per_year: this key is missing; a time series requires it")
         pool = SamplePool(self.section.kind == "extreme")
         taken = self._reader.take(path, pool)
@@ -363,14 +364,6 @@ class _SourceDraft:
             self.pools[group].merge(pool)
         else:
             self.pools[group] = pool
-
-    @property
-    def _weighed(self) -> bool:
-        section = self.section
-        return any(
-            way is not None
-            for way in (section.hours_per_year, section.events_per_year, section.hours_table, section.wind)
-        )
 
     def _stated_hours(self) -> dict[str, float] | None:
         """Return the hours per year of each file by its name, from a table."""
@@ -541,15 +534,6 @@ def _hours_in(row: Sequence[str]) -> float | None:
     if 0.0 <= hours <= HOURS_PER_YEAR:
         return hours
     return None
-
-
-def _wind_seconds(drafts: Sequence[_SourceDraft]) -> dict[float, float]:
-    """Return the total length of the files of each wind speed bin over all sources, s."""
-    seconds: dict[float, float] = {}
-    for draft in drafts:
-        for group, pool in draft.pools.items() if draft.section.wind is not None else ():
-            seconds[group] = seconds.get(group, 0.0) + pool.seconds
-    return seconds
 
 
 def describe_sources(sources: tuple[LoadSource, ...]) -> Iterator[str]:

@@ -26,6 +26,7 @@ from exugear.life.load_spectrum.counted import (
     ToothExposure,
     bearing_turns,
     distinct,
+    forces_of_families,
     tooth_exposures,
 )
 from exugear.life.load_spectrum.counting import LoadPoints, load_duration
@@ -153,45 +154,6 @@ def _plain_values(figures: Mapping[str, float]) -> dict[str, float | str]:
         if not math.isnan(value):
             programs[key] = "infinite" if math.isinf(value) else sheet_value(name, value)
     return programs
-
-
-def rating_sheet(
-    gearbox: Gearbox,
-    rating: RatingSection,
-    counted: CountedLoads,
-    acting: ActingLoads,
-    balance: StaticBalance,
-    finite_elements: Mapping[tuple[str, str, str], Mapping[str, float]],
-    assumptions: tuple[str, ...],
-) -> RatingSheet:
-    """Rate all loaded flanks.
-
-    Parameters
-    ----------
-    counted : of the file, or `exugear.life.rating.sheet.nominal_loads`
-    acting : of these
-    balance : over their torques
-    finite_elements : (gear, family, flank) finite element results
-    """
-    flanks = []
-    scope = {mesh.family: reason for mesh in gearbox.meshes if (reason := outside_scope(mesh.pair))}
-    for tooth in distinct(counted.teeth):
-        if tooth.family in scope:
-            continue
-        for sense in (1, -1):
-            key = tooth.gear, tooth.family, FLANKS[sense * tooth.flank]
-            if np.any(acting.points.torque * sense > 0.0):
-                flank = _flank(gearbox, rating, counted, acting, balance, tooth, sense, finite_elements.get(key, {}))
-                flanks += [] if flank is None else [flank]
-    return RatingSheet(
-        edition=rating.edition,
-        load=_load_in_words(gearbox, counted),
-        flanks=tuple(flanks),
-        shortfalls=tuple(_shortfalls(rating, flanks)),
-        assumptions=(*assumptions, *_assumptions(gearbox, rating)),
-        left_out=(*(f"{family}: not rated, {reason}" for family, reason in scope.items()), *NOT_RATED),
-        other_edition=OTHER_EDITION[rating.edition],
-    )
 
 
 def _flank(
@@ -375,13 +337,7 @@ def nominal_load_values(
     balance: StaticBalance,
     stresses: Mapping[str, MeshCycleStress],
 ) -> dict[FlankKey, dict[str, float]]:
-    """Return the values of the flanks of pairs with stresses under the nominal load, with K_A applied to its torque.
-
-    Parameters
-    ----------
-    counted : the nominal load times K_A
-    stresses : by pair name
-    """
+    """Return the values of the flanks of pairs with stresses under the nominal load, with K_A applied to its torque."""
     dynamic = stated_factors(gearbox, rating.dynamic_factor or rating.minimum_dynamic_factor or 1.0)
     lives = flank_lives(gearbox, rating, counted.teeth, acting_loads(counted), balance, stresses, dynamic)
     return {
@@ -441,10 +397,6 @@ def nominal_loads(gearbox: Gearbox, rating: RatingSection, factor: float = 1.0) 
     torque *= factor
     hours = rating.nominal_hours or LONGEST / least * 2.0 * math.pi / speed / 3600.0
     duration = load_duration(np.array([torque]), np.array([speed]), np.array([hours]), 1)
-    forces = gearbox.train.static_mesh_forces({body: 1.0})
-    families: dict[str, float] = {}
-    for mesh in gearbox.meshes:
-        families[mesh.family] = max(families.get(mesh.family, 0.0), abs(forces[mesh.name]))
     return CountedLoads(
         body=body,
         life_years=hours / HOURS_PER_YEAR,
@@ -456,7 +408,7 @@ def nominal_loads(gearbox: Gearbox, rating: RatingSection, factor: float = 1.0) 
         equivalent_ranges={},
         teeth=teeth,
         bearings=bearing_turns(gearbox, body),
-        mesh_forces=families,
+        mesh_forces=forces_of_families(gearbox, body),
         bin_value="mean",
     )
 
@@ -545,4 +497,24 @@ def rated(
     finite_elements : (gear, family, flank) finite element results, see `exugear.life.rating.sheet`
     remarks : on the finite element results
     """
-    return rating_sheet(gearbox, rating_of(gearbox), counted, acting_loads(counted), balance, finite_elements, remarks)
+    rating = rating_of(gearbox)
+    acting = acting_loads(counted)
+    flanks = []
+    scope = {mesh.family: reason for mesh in gearbox.meshes if (reason := outside_scope(mesh.pair))}
+    for tooth in distinct(counted.teeth):
+        if tooth.family in scope:
+            continue
+        for sense in (1, -1):
+            key = tooth.gear, tooth.family, FLANKS[sense * tooth.flank]
+            if np.any(acting.points.torque * sense > 0.0):
+                flank = _flank(gearbox, rating, counted, acting, balance, tooth, sense, finite_elements.get(key, {}))
+                flanks += [] if flank is None else [flank]
+    return RatingSheet(
+        edition=rating.edition,
+        load=_load_in_words(gearbox, counted),
+        flanks=tuple(flanks),
+        shortfalls=tuple(_shortfalls(rating, flanks)),
+        assumptions=(*remarks, *_assumptions(gearbox, rating)),
+        left_out=(*(f"{family}: not rated, {reason}" for family, reason in scope.items()), *NOT_RATED),
+        other_edition=OTHER_EDITION[rating.edition],
+    )

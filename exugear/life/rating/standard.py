@@ -99,9 +99,7 @@ class FlankRules:
     @property
     def auxiliary_factor(self) -> float:
         """Auxiliary factor in Z_B and Z_D: f_ZCa, or 1 in the edition of 2006."""
-        if self.edition == "ISO 6336:2006":
-            return 1.0
-        return self.f_ZCa
+        return 1.0 if self.edition == "ISO 6336:2006" else self.f_ZCa
 
     @property
     def strength(self) -> StrengthSection | None:
@@ -269,9 +267,7 @@ def _mean(rules: FlankRules, taken: Callable[[Hardening, float], float]) -> floa
     """Return the mean running-in allowance of both gears; zero without their strength."""
     known = [strength for strength in rules.strengths if strength is not None]
     values = [taken(hardening_of(strength), si(strength, "sigma_H_lim_MPa")) for strength in known]
-    if values:
-        return sum(values) / len(values)
-    return 0.0
+    return sum(values) / len(values) if values else 0.0
 
 
 def _stresses(rules: FlankRules, of: dict[str, float]) -> dict[str, float]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from exugear.gearbox.choice import Choice
+from exugear.gearbox.choice import Choice, choice_of
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.variant import Variant, VariantError
@@ -48,11 +48,6 @@ VISIBLE_SHARE = 0.01
 """Minimum TE participation (fraction) of a mode that counts as visible in the overall TE."""
 
 
-def choice_of(attributes: Mapping[str, Any]) -> Choice:
-    """Return the model settings that a run or modes file was computed with, from its attributes, without load case."""
-    return Choice(*(str(attributes[key]) for key in ("variant", "mesh_model", "inertias")))
-
-
 MESH_MODEL_LABELS = {
     "kinematic": "kinematic constraint",
     "constant": "mean mesh stiffness",
@@ -76,6 +71,11 @@ def model_label(choice: Choice) -> str:
     return f"{choice.variant} ({label}), {MESH_MODEL_LABELS[choice.mesh_model]}, inertia set {choice.inertias}"
 
 
+def response_label(data: xr.Dataset) -> str:
+    """Return model settings and method of a steady-state response as text for headings."""
+    return f"{model_label(choice_of(data.attrs))}, {METHOD_LABELS[str(data.attrs['method'])]}"
+
+
 class ReportError(ValueError):
     """Error: the folder contains no results for a report, or none that can be compared."""
 
@@ -85,7 +85,6 @@ class ReportNotes:
     """Messages for the top and the end of the page, each list in order of occurrence."""
 
     statements: list[str] = field(default_factory=list)
-    """Statements of the summary."""
     findings: list[Finding] = field(default_factory=list)
     """Checks of the results that the headline is from, and invalid runs."""
     invalid_runs: list[str] = field(default_factory=list)
@@ -99,7 +98,6 @@ class Context:
     """Data that all sections of one report share."""
 
     folder: Path
-    """Results folder."""
     gearbox: Gearbox
     """Gearbox of the gearbox file stored in the folder."""
     target: float | None
@@ -108,7 +106,6 @@ class Context:
     """Callback for progress messages."""
     notes: ReportNotes = field(default_factory=ReportNotes)
     assemblies: dict[Choice, Assembly] = field(default_factory=dict)
-    """Assembled models by model settings."""
     stiffnesses: dict[str, dict[str, Floats | MeshCurve | SteSurface]] = field(default_factory=dict)
     """Mesh stiffness read so far, by mesh model."""
 
@@ -164,7 +161,15 @@ class StoredResults:
 
 def stored_models(context: Context) -> StoredResults:
     """Read the tables and modes that belong to the gearbox file of the folder (fast); note the others as skipped."""
-    return StoredResults(_stored_tables(context), dict(_stored_modes(context)), ())
+    tables = {}
+    for name in dict.fromkeys(mesh.pair.name for mesh in context.gearbox.meshes):
+        if name in context.gearbox.stated_stiffness:
+            continue
+        try:
+            tables[name] = fitting_table(context.gearbox, name, context.folder)
+        except TableError as error:
+            context.notes.left_out.append(f"table of {name}: {error}")
+    return StoredResults(tables, dict(_stored_modes(context)), ())
 
 
 def with_responses(context: Context, models: StoredResults) -> StoredResults:
@@ -236,18 +241,6 @@ def _is_replaced(gearbox: Gearbox, name: str, digest: str) -> bool:
         return file_digest(recording_path(gearbox, name)) != digest
     except (GearboxFileError, FileError):
         return False
-
-
-def _stored_tables(context: Context) -> dict[str, MeshTable]:
-    tables = {}
-    for name in dict.fromkeys(mesh.pair.name for mesh in context.gearbox.meshes):
-        if name in context.gearbox.stated_stiffness:
-            continue
-        try:
-            tables[name] = fitting_table(context.gearbox, name, context.folder)
-        except TableError as error:
-            context.notes.left_out.append(f"table of {name}: {error}")
-    return tables
 
 
 def _stored_modes(context: Context) -> Iterator[tuple[Choice, xr.Dataset]]:

@@ -101,7 +101,6 @@ class DesignStudy:
     quantity: str = "error"
     """Quantity that decides, as in `exugear.report.findings.ranking.Ranking`."""
     number: int = 1
-    """Rank of the resonance."""
     loads: Sequence[str] = field(default=("static load",))
     """Loads at which each change is computed."""
     requirements: Sequence[str] = ()
@@ -193,9 +192,7 @@ def _result_from(content: Mapping[str, Any]) -> ChangeResult:
 
 
 def _number(value: float | None) -> float | None:
-    if value is None:
-        return None
-    return float(value)
+    return None if value is None else float(value)
 
 
 # Effects
@@ -207,7 +204,6 @@ def multiples_of(data: xr.Dataset, order: float, families: Collection[str]) -> d
     Parameters
     ----------
     order : periods per revolution of the input
-    families : families of meshes of the gearbox
 
     Returns
     -------
@@ -243,7 +239,6 @@ def peaks_of(
     ----------
     data : as `exugear.steady.steady_file.load_response` reads it
     multiples : as `multiples_of` returns them; they are the same with other numbers of teeth
-    families : families of meshes of the gearbox
     frequency : of the resonance, Hz
     inside : lowest and highest speed of the range, rad/s
     """
@@ -311,11 +306,6 @@ def least_favourable(effects: Sequence[Mapping[str, Effect]]) -> dict[str, Effec
 def objection_to(effects: Mapping[str, Effect], quantity: str, labels: Mapping[str, str]) -> str:
     """Say why effects speak against a change; empty if they do not.
 
-    Parameters
-    ----------
-    quantity : the one that decides
-    labels : names of the quantities
-
     Examples
     --------
     >>> effects = {"error": Effect(-10.9, -10.9), "force": Effect(-10.9, 12.4)}
@@ -334,12 +324,7 @@ def objection_to(effects: Mapping[str, Effect], quantity: str, labels: Mapping[s
 
 
 def price_of(before: Gearbox, after: Gearbox, nominal: bool = True) -> str:
-    """Differences of speed ratio, mass, axial force and nominal contact stress of gears, as text.
-
-    Parameters
-    ----------
-    nominal : whether to list the nominal contact stress, for gearboxes without a load spectrum
-    """
+    """Differences of ratio, mass, axial force and, if `nominal`, nominal contact stress of gears, as text."""
     costs = []
     if abs(after.train.ratio / before.train.ratio - 1.0) > 1e-6:
         costs.append(f"speed ratio {before.train.ratio:.4g} to {after.train.ratio:.4g}")

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from exugear.gearbox.choice import choice_of
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
-from exugear.report.findings.context import REFERENCE_VARIANT, Context, choice_of
+from exugear.report.findings.context import REFERENCE_VARIANT, Context
 from exugear.report.findings.groups import RankedResonance, RunGroup
 from exugear.report.findings.headline import headline_of_group
 from exugear.report.findings.parameter_variations import BestChange, ModelVariations, best_change
@@ -98,12 +99,10 @@ class SummaryCard:
     """Finding for a card of the page and a line of the command line."""
 
     kind: str
-    """Heading."""
     figure: str
     beside: str
     """Value in large letters, and the text next to it."""
     sentence: str
-    """Further text."""
     link: str
     """Section of the page with details."""
 
@@ -159,12 +158,7 @@ def facts_of(
 
 
 def facts_of_response(words: Labels, response: xr.Dataset) -> tuple[SummaryCard, ...]:
-    """Return the finding of a steady-state response without a run-up of the same model settings.
-
-    Parameters
-    ----------
-    response : as `exugear.steady.steady_file.load_response` reads it
-    """
+    """Return the finding of a response from `load_response` without a run-up of the same model settings."""
     top = next(iter(peaks(response)), None)
     if top is None:
         return ()
@@ -185,24 +179,21 @@ def _loudest(context: Context, words: Labels, group: RunGroup) -> SummaryCard | 
     unseen = _unseen(context, words, group, top)
     if unseen is not None:
         return unseen
+    source = ", constant speed" if group.responses else ""
+    if not group.responses and top.constant is not None:
+        source = f", {amplitude_text(top.peak.level)} in the run-up"
+    modes = group.runs[group.main].modes
+    shape = words.labelled(top.finding.mode_name)
+    if top.finding.mode is not None and modes is not None:
+        shape = words.moves(modes, top.finding.mode)
     said = short(
         f"Order {words.line(top.peak.line)}.",
-        f"Overall TE {amplitude_text(top.ranking_level)} ({figure_text(top.ranking_level)} dB){_how(group, top)}.",
+        f"Overall TE {amplitude_text(top.ranking_level)} ({figure_text(top.ranking_level)} dB){source}.",
         *_speed_relative_to_rated(context, group),
-        _moves(words, group, top),
+        f"Mode: {shape}." if shape else "",
     )
     beside = f"at {speed_text(top.speed)}, {Variant.of(group.main).label}"
     return SummaryCard(HIGHEST, frequency_text(top.frequency), beside, said, "rings")
-
-
-def _moves(words: Labels, group: RunGroup, resonance: RankedResonance) -> str:
-    """Describe the mode shape of a resonance in a sentence; empty if the mode is unknown."""
-    modes = group.runs[group.main].modes
-    if resonance.finding.mode is not None and modes is not None:
-        return f"Mode: {words.moves(modes, resonance.finding.mode)}."
-    if resonance.finding.mode_name:
-        return f"Mode: {words.labelled(resonance.finding.mode_name)}."
-    return ""
 
 
 def _unseen(context: Context, words: Labels, group: RunGroup, top: RankedResonance) -> SummaryCard | None:
@@ -220,15 +211,6 @@ def _unseen(context: Context, words: Labels, group: RunGroup, top: RankedResonan
     )
     beside = f"at {speed_text(at.speed)}, {Variant.of(group.main).label}"
     return SummaryCard(HIGHEST, frequency_text(at.frequency), beside, said, "steady")
-
-
-def _how(group: RunGroup, resonance: RankedResonance) -> str:
-    """State the source of a level, unless it is a run-up alone."""
-    if group.responses:
-        return ", constant speed"
-    if resonance.constant is None:
-        return ""
-    return f", {amplitude_text(resonance.peak.level)} in the run-up"
 
 
 def _speed_relative_to_rated(context: Context, group: RunGroup) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from exugear.gearbox.choice import Choice
+from exugear.gearbox.choice import Choice, choice_of
 from exugear.gearbox.load_cases import operating_range
 from exugear.gearbox.variant import OFFERED, Variant
 from exugear.report.findings.context import (
@@ -26,7 +26,6 @@ from exugear.report.findings.context import (
     REFERENCE_VARIANT,
     Context,
     StoredResults,
-    choice_of,
     run_key,
 )
 from exugear.report.findings.ranking import (
@@ -93,30 +92,22 @@ class RankedResonance:
     @property
     def ranking_level(self) -> float:
         """Level (dB) used for the ranking: at constant speed where available, otherwise in the run-up."""
-        if self.constant is None:
-            return self.peak.level
-        return self.constant.level
+        return self.peak.level if self.constant is None else self.constant.level
 
     @property
     def frequency(self) -> float:
         """Frequency of the highest peak, Hz."""
-        if self.constant is None:
-            return self.finding.resonance.frequency
-        return self.constant.frequency
+        return self.finding.resonance.frequency if self.constant is None else self.constant.frequency
 
     @property
     def speed(self) -> float:
         """Absolute input speed at the highest peak, rad/s."""
-        if self.constant is None:
-            return abs(self.peak.speed)
-        return self.constant.speed
+        return abs(self.peak.speed) if self.constant is None else self.constant.speed
 
     @property
     def missed(self) -> float:
         """Level at constant speed minus level in the run-up, dB; 0 if the former is unknown."""
-        if self.constant is None:
-            return 0.0
-        return self.constant.level - self.peak.level
+        return 0.0 if self.constant is None else self.constant.level - self.peak.level
 
 
 @dataclass(frozen=True)
@@ -294,31 +285,23 @@ def _in_operation(
     stated: tuple[float, float] | None,
     wanted: str | None,
 ) -> Ranking:
-    """Rank the resonances in the operating range, or at all speeds if there is none."""
-    found = _ranking(run, ranked, response, stated, wanted)
+    """Rank the resonances of a response, or else of a run-up, in the operating range, or at all speeds without any."""
+    speed = run.spectra.speed
+
+    def within(speeds: tuple[float, float] | None) -> Ranking:
+        if response is not None:
+            return ranking_of(response, speeds, wanted)
+        peaks = [
+            (own.peak.line, own.speed, own.frequency, 1e-6 * 10.0 ** (own.peak.level / 20.0))
+            for own in ranked
+            if own.steady
+        ]
+        return ranking_of_errors(peaks, speed, speeds)
+
+    found = within(stated)
     if found.resonances or found.whole:
         return found
-    speed = run.spectra.speed
-    everywhere = _ranking(run, ranked, response, (float(speed.min()), float(speed.max())), wanted)
-    return replace(everywhere, whole=True, without=found.speeds)
-
-
-def _ranking(
-    run: VariantRun,
-    ranked: Sequence[RankedResonance],
-    response: xr.Dataset | None,
-    stated: tuple[float, float] | None,
-    wanted: str | None,
-) -> Ranking:
-    """Rank the resonances of a steady-state response, or else of a run-up, within given speeds (rad/s)."""
-    if response is not None:
-        return ranking_of(response, stated, wanted)
-    peaks = [
-        (own.peak.line, own.speed, own.frequency, 1e-6 * 10.0 ** (own.peak.level / 20.0))
-        for own in ranked
-        if own.steady
-    ]
-    return ranking_of_errors(peaks, run.spectra.speed, stated)
+    return replace(within((float(speed.min()), float(speed.max()))), whole=True, without=found.speeds)
 
 
 def _spectra_of_response(context: Context, data: xr.Dataset, results: StoredResults) -> VariantRun:
@@ -408,7 +391,6 @@ class Channel:
     kind: str
     """{"support", "mesh", "coupling", "body"}"""
     words: str
-    """Label."""
     copies: int
     """Number of equal parts that it represents."""
     mean: float
@@ -468,7 +450,7 @@ def _supports(data: _Signals, run: VariantRun, words: Labels) -> Iterator[Channe
     names = [str(name) for name in data["support"]]
     sample = force[::SAMPLED]
     swings = np.hypot(sample[..., 0], sample[..., 1]).std(axis=0)
-    for place, copies in _standing_for(names, swings, words):
+    for place, copies, label in _standing_for(names, swings, words):
         own = np.ascontiguousarray(force[:, place].T)
         parts = [_waterfall(own[axis], data, run) for axis in (0, 1)]
         whole = replace(parts[0], amplitude=np.hypot(parts[0].amplitude, parts[1].amplitude))
@@ -477,37 +459,29 @@ def _supports(data: _Signals, run: VariantRun, words: Labels) -> Iterator[Channe
         mean = max(math.hypot(*middle[:, :2].mean(axis=0)), 0.0)
         if copies > 1:
             mean = float(np.hypot(middle[:, 0], middle[:, 1]).mean())
-        label = words.of(words.family(names[place])) if copies > 1 else words.of(names[place])
         yield Channel(names[place], "support", label, copies, mean, float(middle[:, 2].mean()), whole)
 
 
 def _meshes(data: _Signals, run: VariantRun, words: Labels) -> Iterator[Channel]:
     force = data["mesh_force"]
     names = [str(name) for name in data["mesh"]]
-    for place, copies in _standing_for(names, force[::SAMPLED].std(axis=0), words):
+    for place, copies, label in _standing_for(names, force[::SAMPLED].std(axis=0), words):
         own = np.ascontiguousarray(force[:, place])
-        label = words.of(words.family(names[place])) if copies > 1 else words.of(names[place])
         mean = float(_middle(own).mean(dtype=np.float64))
         yield Channel(names[place], "mesh", f"mesh {label}", copies, mean, math.nan, _waterfall(own, data, run))
 
 
 def _lines(response: xr.Dataset, words: Labels, highest: float) -> Iterator[Channel]:
-    supports: dict[str, list[str]] = {}
-    meshes: dict[str, list[str]] = {}
-    couplings: dict[str, list[str]] = {}
-    bodies: dict[str, list[str]] = {}
+    kinds = {"support_force": "support", "mesh_force": "mesh", "coupling_torque": "coupling", "body_speed": "body"}
+    found: dict[str, dict[str, list[str]]] = {kind: {} for kind in kinds.values()}
     for name in map(str, response["signal"].to_numpy()):
         quantity, _, rest = name.partition(" ")
         place, _, axis = rest.rpartition(" ")
         if quantity == "support_force" and axis != AXIAL:
-            supports.setdefault(place, []).append(name)
-        elif quantity == "mesh_force":
-            meshes[rest] = [name]
-        elif quantity == "coupling_torque":
-            couplings[rest] = [name]
-        elif quantity == "body_speed" and rest in words.coupled:
-            bodies[rest] = [name]
-    for kind, places in (("support", supports), ("mesh", meshes), ("coupling", couplings), ("body", bodies)):
+            found["support"].setdefault(place, []).append(name)
+        elif quantity in ("mesh_force", "coupling_torque") or (quantity == "body_speed" and rest in words.coupled):
+            found[kinds[quantity]][rest] = [name]
+    for kind, places in found.items():
         for place, signals in places.items():
             spectra = response_spectra(response, signals, highest, 1.0, UNITS.get(kind, "N"))
             name, *wave = place.split(" ")
@@ -515,19 +489,19 @@ def _lines(response: xr.Dataset, words: Labels, highest: float) -> Iterator[Chan
             yield Channel(_key(kind, place), kind, label, 1, math.nan, math.nan, spectra)
 
 
-def _standing_for(names: Sequence[str], swings: Floats, words: Labels) -> list[tuple[int, int]]:
-    """Return the index of the channel that represents each family, and the number of members."""
+def _standing_for(names: Sequence[str], swings: Floats, words: Labels) -> Iterator[tuple[int, int, str]]:
+    """Yield the index of the channel that represents each family, the number of members, and the label."""
     families: dict[str, list[int]] = {}
     for place, name in enumerate(names):
         families.setdefault(words.family(name), []).append(place)
-    return [(max(family, key=lambda place: float(swings[place])), len(family)) for family in families.values()]
+    for family, places in families.items():
+        place = max(places, key=lambda place: float(swings[place]))
+        yield place, len(places), words.of(family if len(places) > 1 else names[place])
 
 
 def _middle(values: Floats) -> Floats:
     third = len(values) // 3
-    if third:
-        return values[MEAN_PART.start * third : MEAN_PART.stop * third]
-    return values
+    return values[MEAN_PART.start * third : MEAN_PART.stop * third] if third else values
 
 
 def _waterfall(values: Floats, data: _Signals, run: VariantRun, unit: str = "N") -> Waterfall:

@@ -118,12 +118,7 @@ class Headline:
         return max(met, key=lambda crossing: float(crossing["share"]), default=None)
 
     def envelopes(self, lines: Sequence[OrderLine]) -> dict[str, Envelope]:
-        """Return the largest single order of each quantity over speed; none for an estimate from modes.
-
-        Parameters
-        ----------
-        lines : evaluated orders of a run-up
-        """
+        """Return the largest single order of each quantity over speed; none for an estimate from modes."""
         if self.response is not None:
             return envelopes(self.response)
         if self.group is None:
@@ -186,9 +181,7 @@ def headline_of_response(group: RunGroup, variant: str) -> Headline:
 def headline_of(context: Context, results: StoredResults, groups: Sequence[RunGroup]) -> Headline | None:
     """Return the ranking that the report leads with; None if nothing is ranked.
 
-    Parameters
-    ----------
-    groups : the most informative first
+    The `groups` are sorted, the most informative first.
     """
     for group in groups:
         # Other inertia sets are compared with that of the first group.
@@ -243,7 +236,6 @@ class Cause:
     swing: float
     """Amplitude of this harmonic of the static transmission error, and its peak-to-peak value, m."""
     overlap: float
-    """Overlap ratio."""
     share: float | None
     """Fraction of the amplitude that the meshes of this pair cause; None where it is not computed."""
 

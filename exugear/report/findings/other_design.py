@@ -63,11 +63,6 @@ class HighestAmplitude:
 def read_other_design(context: Context, headline: Headline | None, folder: Path) -> OtherDesign:
     """Read the results of another design.
 
-    Parameters
-    ----------
-    headline : ranking of the page
-    folder : results folder of the other design
-
     Raises
     ------
     GearboxFileError

@@ -61,7 +61,6 @@ class BestChange:
     """Parameter change that minimises the largest amplification within an octave of a mode."""
 
     label: str
-    """Label of the parameter."""
     value: float
     default: float
     gain: float

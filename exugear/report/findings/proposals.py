@@ -47,7 +47,6 @@ class DesignChange:
     name: str
     """Short name, of letters, digits and hyphens."""
     words: str
-    """What changes, as text."""
     group: str
     """One of `GROUPS`."""
     keys: Mapping[str, Any]
@@ -237,7 +236,6 @@ def alignment_change(gearbox: Gearbox, family: str, opening: float) -> DesignCha
 
     Parameters
     ----------
-    family : of the meshes
     opening : gap at the +z end of the common face under the static load, m; negative if the teeth carry there
 
     Examples
@@ -288,7 +286,15 @@ def _phasing_changes(gearbox: Gearbox, multiples: Mapping[str, int]) -> Iterator
     if any(section.phase is not None for section in gearbox.case.meshes.values()):
         return
     gears_of_pairs = [_gear_names(gearbox, name) for name in gearbox.gear_pairs]
-    for (body, planet), multiple in _planet_gears(gearbox, multiples).items():
+    bodies = gearbox.named_bodies
+    planet_gears = {
+        (bodies[body].family, gear.name): multiples[mesh.family]
+        for mesh in gearbox.meshes
+        if mesh.family in multiples
+        for body, gear in ((mesh.pinion, mesh.pair.pinion), (mesh.gear, mesh.pair.gear))
+        if bodies[body].planet_of is not None
+    }
+    for (body, planet), multiple in planet_gears.items():
         mating = sorted({gear for both in gears_of_pairs if planet in both for gear in both} - {planet})
         branches = any(planet not in both and set(both) & set(mating) for both in gears_of_pairs)
         if branches or len(gearbox.case.bodies[body].gears_z_mm) > 1:
@@ -312,18 +318,6 @@ def _phasing_changes(gearbox: Gearbox, multiples: Mapping[str, int]) -> Iterator
             counts = ", ".join(f"{gear} {sections[gear].teeth} to {count}" for gear, count in sorted(teeth.items()))
             text = f"planets mesh {phasing}: teeth of {counts}; same centre distances"
             yield DesignChange(f"{body}-{teeth[planet]}-teeth", text, "gear", keys)
-
-
-def _planet_gears(gearbox: Gearbox, multiples: Mapping[str, int]) -> dict[tuple[str, str], int]:
-    """Multiples of the mesh frequency by planet section and gear of the planet."""
-    bodies = gearbox.named_bodies
-    return {
-        (bodies[body].family, gear.name): multiples[mesh.family]
-        for mesh in gearbox.meshes
-        if mesh.family in multiples
-        for body, gear in ((mesh.pinion, mesh.pair.pinion), (mesh.gear, mesh.pair.gear))
-        if bodies[body].planet_of is not None
-    }
 
 
 def _bearing_changes(gearbox: Gearbox, family: str) -> list[DesignChange]:

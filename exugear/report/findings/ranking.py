@@ -14,16 +14,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from exugear.gearbox.choice import Choice
+from exugear.gearbox.choice import Choice, choice_of
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.units import RPM
-from exugear.report.findings.context import choice_of
 from exugear.results.findings import Finding
 from exugear.results.spectra.line_spectra import LineSpectra, line_spectra
 from exugear.results.spectra.waterfall import OrderLine
 from exugear.steady.harmonics.branches import standing_peaks
 from exugear.steady.mean_system.signals import Quantity, vector_peak
-from exugear.steady.peaks import SWEEP_SHIFT, line_name
+from exugear.steady.peaks import SWEEP_SHIFT
 from exugear.steady.settings import METHODS
 from exugear.steady.steady_file import complex_amplitudes, response_quantities, settings_of
 from fe_ste.tools.arrays import Booleans, Floats
@@ -170,7 +169,6 @@ class Ranking:
     quantity: str = "error"
     """Quantity that decides the order."""
     reason: str = ONLY_QUANTITY
-    """Why it decides, as text."""
 
     @property
     def wanted(self) -> str:
@@ -198,12 +196,7 @@ class Ranking:
 
 
 def deciding_quantity(available: Collection[str], wanted: str | None) -> tuple[str, str]:
-    """Return the quantity that decides the order of a ranking, and the reason as text.
-
-    Parameters
-    ----------
-    available : quantities of a response
-    wanted : name as in `DECIDING`; None for the default
+    """Return the quantity that decides a ranking, the one wanted in `DECIDING` or the default, and the reason as text.
 
     Examples
     --------
@@ -262,10 +255,24 @@ def ranking_of(data: xr.Dataset, speeds: tuple[float, float] | None = None, want
             groups.append(group)
             others.append(group)
         group[name] = place, point, line
-    limits = _limits(data, quantities, peaks)
-    lines = _Lines.of(data)
-    found = tuple(_resonance(lines, quantities, sizes, group, limits) for group in groups)
-    return Ranking(found, (low, high), whole, _accelerating_parts(data), quantity=first, reason=reason)
+    ends_of_damping = _limits(data, quantities, peaks)
+    names = data["line"].to_numpy()[1:].tolist()
+    orders = data["order"].to_numpy()[1:].astype(np.float64)
+    found = []
+    for group in groups:
+        _, first_point, line = next(iter(group.values()))
+        amplitudes = {}
+        for quantity in quantities:
+            rank, point, _ = group.get(quantity.name, (None, first_point, line))
+            at = sizes[quantity.name][point, line]
+            limits = ends_of_damping.get((point, line, quantity.name))
+            where = quantity.places[int(at.argmax())]
+            amplitudes[quantity.name] = PeakAmplitude(float(at.max()), where, rank, limits)
+        order = float(orders[line])
+        at_speed = float(data["speed"][first_point])
+        frequency = order * abs(at_speed) / (2.0 * np.pi)
+        found.append(Resonance(names[line], order, at_speed, frequency, amplitudes))
+    return Ranking(tuple(found), (low, high), whole, _accelerating_parts(data), quantity=first, reason=reason)
 
 
 def resonances(data: xr.Dataset, quantity: str | None = None) -> pd.DataFrame:
@@ -433,41 +440,6 @@ def _is_same_resonance(group: Mapping[str, tuple[int, int, int]], speed: Floats,
     return bool(abs(speed[point] - speed[first]) <= SAME_SPEED_TOLERANCE * speed[first])
 
 
-@dataclass(frozen=True)
-class _Lines:
-    """Names and orders of the lines but 0, and speeds of the points (rad/s), taken from the file once."""
-
-    names: tuple[str, ...]
-    orders: Floats
-    speeds: Floats
-
-    @classmethod
-    def of(cls, data: xr.Dataset) -> _Lines:
-        bases = tuple(str(name) for name in data["base"].to_numpy())
-        names = tuple(line_name(tuple(multiples), bases) for multiples in data["index"].to_numpy()[1:].tolist())
-        return cls(names, data["order"].to_numpy()[1:].astype(np.float64), data["speed"].to_numpy().astype(np.float64))
-
-
-def _resonance(
-    lines: _Lines,
-    quantities: tuple[Quantity, ...],
-    sizes: Mapping[str, Floats],
-    group: Mapping[str, tuple[int, int, int]],
-    limits: Limits,
-) -> Resonance:
-    _, first, line = next(iter(group.values()))
-    amplitudes = {}
-    for quantity in quantities:
-        place, point, _ = group.get(quantity.name, (None, first, line))
-        at = sizes[quantity.name][point, line]
-        amplitudes[quantity.name] = PeakAmplitude(
-            float(at.max()), quantity.places[int(at.argmax())], place, limits.get((point, line, quantity.name))
-        )
-    order = float(lines.orders[line])
-    speed = float(lines.speeds[first])
-    return Resonance(lines.names[line], order, speed, order * abs(speed) / (2.0 * np.pi), amplitudes)
-
-
 def _accelerating_parts(data: xr.Dataset) -> str:
     """Return the parts whose accelerations are given, from the seat data of the file."""
     carried = {bool(carrier) for carrier in json.loads(str(data.attrs["carried_seats"])).values()}
@@ -516,9 +488,7 @@ class ConstantSpeed:
     def along(self, line: OrderLine) -> Floats | None:
         """Return the level at each speed, dB re 1 µm; None if the response does not contain the order."""
         place = line.place(self.orders)
-        if place is None:
-            return None
-        return self.level[:, place]
+        return None if place is None else self.level[:, place]
 
     def near(self, line: OrderLine, frequency: float, resolution: float) -> OrderPeak | None:
         """Return the highest peak of an order within the resolution of a run-up around a frequency (both Hz).
@@ -551,12 +521,7 @@ class ConstantSpeed:
 
 
 def constant_speed_of(response: xr.Dataset) -> ConstantSpeed:
-    """Return the levels of the overall transmission error of a steady-state response.
-
-    Parameters
-    ----------
-    response : as `exugear.steady.steady_file.load_response` reads it
-    """
+    """Return the levels of the overall transmission error of a steady-state response from `load_response`."""
     speed = np.abs(response["speed"].to_numpy())
     rising = np.argsort(speed, kind="stable")
     signals = [str(name) for name in response["signal"].to_numpy()]
@@ -577,9 +542,7 @@ def most_complete_response(responses: Iterable[xr.Dataset], choice: Choice) -> x
 def most_complete_levels(responses: Iterable[xr.Dataset], choice: Choice) -> ConstantSpeed | None:
     """Return the levels of the response that `most_complete_response` selects."""
     best = most_complete_response(responses, choice)
-    if best is None:
-        return None
-    return constant_speed_of(best)
+    return None if best is None else constant_speed_of(best)
 
 
 def is_over_speed(response: xr.Dataset) -> bool:
@@ -588,12 +551,7 @@ def is_over_speed(response: xr.Dataset) -> bool:
 
 
 def highest_drawn(gearbox: Gearbox, response: xr.Dataset, ranking: Ranking | None = None) -> float:
-    """Return the highest frequency (Hz) drawn for a steady-state response: of the meshes, and of the first resonances.
-
-    Parameters
-    ----------
-    ranking : its first resonances are drawn, too
-    """
+    """Return the highest frequency (Hz) drawn for a steady-state response: of meshes and of the first resonances."""
     fastest = float(np.abs(response["speed"]).max())
     first = () if ranking is None else ranking.resonances[:DRAWN]
     frequencies = [*gearbox.train.mesh_frequencies(fastest).values(), *(own.frequency for own in first)]

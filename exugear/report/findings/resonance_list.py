@@ -1,7 +1,4 @@
-"""List of resonances of a result: those in the operating range first, by the ranking, then those at other speeds.
-
-Tables, diagrams and scripts of the page number resonances by this list.
-"""
+"""List of resonances of a result: those in the operating range first, by the ranking, then those at other speeds."""
 
 from __future__ import annotations
 
@@ -12,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from exugear.report.findings.groups import SAME_FREQUENCY, RankedResonance, RunGroup
-from exugear.report.findings.headline import Headline, headline_of_response
+from exugear.report.findings.headline import headline_of_response
 from exugear.report.findings.ranking import MIN_AMPLITUDE, Resonance, ranking_of
 from exugear.results.spectra.resonances import Pick
 from exugear.results.spectra.waterfall import OrderLine
@@ -65,13 +62,14 @@ def _of_response(group: RunGroup, variant: str) -> Iterator[ListedResonance]:
         everywhere = ranking_of(group.responses[variant], (float(speed.min()), float(speed.max())), ranking.wanted)
         outside = [own for own in everywhere.resonances if not low <= abs(own.speed) <= high][:MOST_OUTSIDE]
     for own in (*inside, *map(_without_ranks, outside)):
+        found = headline.mode_of(own)
         yield ListedResonance(
             OrderLine(own.line.replace(" x ", " × "), own.order),
             abs(own.speed),
             own.frequency,
-            _level(own),
+            20.0 * math.log10(max(own.amplitudes["error"].amplitude, MIN_AMPLITUDE) / 1e-6),
             own in inside,
-            _mode(headline, own),
+            None if found is None else found.index,
             own,
             _peak_of(group.ranked[variant], own),
             caveats.at(own.speed),
@@ -81,15 +79,6 @@ def _of_response(group: RunGroup, variant: str) -> Iterator[ListedResonance]:
 def _without_ranks(own: Resonance) -> Resonance:
     """Return a resonance outside the range: ranks count within it."""
     return replace(own, amplitudes={name: replace(one, place=None) for name, one in own.amplitudes.items()})
-
-
-def _level(own: Resonance) -> float:
-    return 20.0 * math.log10(max(own.amplitudes["error"].amplitude, MIN_AMPLITUDE) / 1e-6)
-
-
-def _mode(headline: Headline, own: Resonance) -> int | None:
-    found = headline.mode_of(own)
-    return None if found is None else found.index
 
 
 def _peak_of(ranked: Sequence[RankedResonance], own: Resonance) -> RankedResonance | None:

@@ -101,6 +101,4 @@ def _check_resonances(group: RunGroup) -> list[Finding]:
 def _fraction(number: int, count: int, passed: bool) -> str:
     """Return how many of the highest resonances a check found, as text."""
     found = f"{number} of the {count} highest resonances"
-    if passed:
-        return found
-    return f"only {found}"
+    return found if passed else f"only {found}"

@@ -122,9 +122,7 @@ class Labels:
     def family(self, name: str) -> str:
         """Return the common name of the members of a planet set."""
         copy = _COPY.match(name)
-        if copy and copy[1] in self._copied:
-            return copy[1]
-        return name
+        return copy[1] if copy and copy[1] in self._copied else name
 
     @cached_property
     def _copied(self) -> set[str]:
@@ -189,10 +187,6 @@ class Labels:
 
     def causes(self, order: float, before: str = "") -> str:
         """Name the excitations of the file at an order of the input in parentheses; empty if there are none.
-
-        Parameters
-        ----------
-        before : text before the names
 
         Examples
         --------
@@ -302,9 +296,7 @@ def joined(parts: Iterable[str]) -> str:
     'a, b and c'
     """
     *first, last = parts
-    if first:
-        return f"{', '.join(first)} and {last}"
-    return last
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def figure_text(value: float, digits: int = 3) -> str:

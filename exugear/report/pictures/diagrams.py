@@ -52,13 +52,10 @@ def plot_campbell(
     Parameters
     ----------
     eigenfrequencies : (n,) Hz
-    lines : exciting orders
     fastest : highest speed of the carrier, rad/s
-    path : file for the picture
     names : names of the modes, written on their lines
     weights : (n,) visibility of each mode in the observed quantity, 0 to 1: size of the marks at its crossings
     highest_frequency : end of the frequency axis, Hz
-    title : variant and inertia set
     """
     modes = np.asarray(eigenfrequencies, dtype=np.float64)
     size = np.ones(modes.size) if weights is None else np.asarray(weights, dtype=np.float64)

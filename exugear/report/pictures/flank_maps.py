@@ -45,7 +45,6 @@ class FlankMap:
     loads: tuple[Mark, ...]
     """Of the line load, N/mm."""
     words: str
-    """Content as text."""
     bar: tuple[float, float]
     colours: str
     """Edges of the colour bar, and the address that contains its colours as PNG."""

@@ -14,7 +14,7 @@ import scipy.linalg
 
 from exugear.gearbox.parts import seat_key
 from exugear.report.pictures.shapes import BodyShape, ModeScene, blank_discs, gear_surface, placed
-from exugear.system.bodies.reduction import BodySurface, ReducedBody
+from exugear.system.bodies.reduction import ReducedBody
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Floats, Integers, Pixels
 from fe_ste.tools.drawing import (
@@ -122,14 +122,7 @@ def draw_gearbox(
     title: str = "",
     size: tuple[int, int] = (1600, 1200),
 ) -> Figure:
-    """Draw the bodies of a gearbox, each in its colour.
-
-    Parameters
-    ----------
-    bodies : shapes
-    path : file for the picture
-    title : name of the gearbox
-    size : width and height of the rendered image, pixels
+    """Draw the bodies of a gearbox, each in its colour; the rendered image has a size in pixels.
 
     Raises
     ------
@@ -156,13 +149,7 @@ def draw_gearbox(
 
 
 def draw_mode(scene: ModeScene, path: str | Path | None = None, *, size: tuple[int, int] = (1600, 1200)) -> Figure:
-    """Draw a mode or an operating deflection shape at its maximum deflection, coloured by displacement.
-
-    Parameters
-    ----------
-    scene : the mode
-    path : file for the picture
-    size : width and height of the rendered image, pixels
+    """Draw a mode or operating deflection shape at its maximum, coloured by displacement; the size is in pixels.
 
     Raises
     ------
@@ -184,7 +171,6 @@ def animate_mode(
 
     Parameters
     ----------
-    scene : the mode
     path : output file; the suffix must be ``.gif``
     frames : pictures per period
     duration : length of a period, s
@@ -285,9 +271,7 @@ def displacement_map() -> Colormap:
 
 
 def _opacity(body: BodyShape) -> float:
-    if body.fixed:
-        return 0.22
-    return 1.0
+    return 0.22 if body.fixed else 1.0
 
 
 def channels(colour: str) -> tuple[float, float, float]:
@@ -356,7 +340,9 @@ def elastic_scene(assembly: Assembly, shape: Floats, *, title: str = "", amplitu
     for name, coordinates in assembly.elastic_slices.items():
         surface = assembly.elastic_bodies[name].reduced.surface
         if name in fixed and surface.elasticity.any():  # the nodes of matrices hide nothing
-            surface = _half_behind(surface, fixed[name])
+            # only the half behind the axis, seen from `SIDE`
+            behind = (surface.points[surface.quads].mean(axis=1)[:, :2] - fixed[name]) @ SIDE[:2] < 0.0
+            surface = replace(surface, quads=surface.quads[behind], strain=surface.strain[behind])
         motion = shape[coordinates]
         deformed.append((surface, surface.displacement @ motion, surface.energy_density(motion)))
     largest = max(float(np.linalg.norm(moved, axis=1).max()) for _, moved, _ in deformed)
@@ -377,12 +363,6 @@ def elastic_scene(assembly: Assembly, shape: Floats, *, title: str = "", amplitu
         motions=motions,
         title=title,
     )
-
-
-def _half_behind(surface: BodySurface, axis: tuple[float, float]) -> BodySurface:
-    """Return the faces of a surface that lie behind an axis along z, seen from `SIDE`."""
-    behind = (surface.points[surface.quads].mean(axis=1)[:, :2] - axis) @ SIDE[:2] < 0.0
-    return replace(surface, quads=surface.quads[behind], strain=surface.strain[behind])
 
 
 def _areas(points: Floats, quads: Integers) -> Floats:
@@ -420,11 +400,6 @@ def draw_elastic_bodies(
     scene: ElasticScene, path: str | Path | None = None, *, size: tuple[int, int] = (1600, 1200)
 ) -> Figure:
     """Draw flexible bodies at maximum deflection, coloured by strain energy density; gears are translucent.
-
-    Parameters
-    ----------
-    path : file for the picture
-    size : width and height of the rendered image, pixels
 
     Raises
     ------
@@ -514,12 +489,7 @@ DRAWN_DEFLECTION = 0.06
 
 
 def draw_free_vibration(body: ReducedBody, number: int, path: str | Path | None = None) -> Figure:
-    """Draw an elastic mode of a free body, coloured by displacement.
-
-    Parameters
-    ----------
-    number : 0 for the first elastic mode
-    path : file for the picture
+    """Draw an elastic mode of a free body, number 0 for the first one, coloured by displacement.
 
     Raises
     ------

@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 from exugear.gearbox.body_parts import blank_places
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Body, Mesh
-from exugear.gearbox.sections.bodies import ShapeSection
 from exugear.gearbox.units import MM
 from fe_ste.geometry.gears import Gear
 from fe_ste.geometry.profile import tooth_profile
@@ -58,7 +57,6 @@ def gear_surface(gear: Gear, angle: float = 0.0, rim_diameter: float | None = No
 
     Parameters
     ----------
-    gear : the gear
     angle : polar angle of the middle of a tooth at z = 0, rad
     rim_diameter : bore of an external, outside diameter of an internal gear, m; by default the fixed diameter
 
@@ -150,11 +148,7 @@ class BodyShape:
 
 
 def bodies_of(gearbox: Gearbox) -> tuple[BodyShape, ...]:
-    """Return the shapes of all bodies of a gearbox that have gears or a stepped shaft, or carry planets.
-
-    Parameters
-    ----------
-    gearbox : the gearbox; its gears are rotated so that the teeth mesh
+    """Return the shapes of all bodies with gears (rotated so that the teeth mesh), a stepped shaft or planets.
 
     Returns
     -------
@@ -186,10 +180,6 @@ def bodies_of(gearbox: Gearbox) -> tuple[BodyShape, ...]:
 
 def tooth_angles(meshes: Sequence[Mesh]) -> dict[tuple[str, str], float]:
     """Rotate the gears of a train so that the teeth of each meet tooth spaces of its mating gears.
-
-    Parameters
-    ----------
-    meshes : all active meshes
 
     Returns
     -------
@@ -240,9 +230,7 @@ def _has_shaft(body: Body) -> bool:
 
 def _rim(gearbox: Gearbox, body: Body, gear: str) -> float | None:
     """Return the inner diameter of a gear on a shaft (the shaft's); None for planets and rings: the fixed diameter."""
-    if _has_shaft(body) and not gearbox.gears[gear].internal:
-        return _shaft_diameter(gearbox, body)
-    return None
+    return _shaft_diameter(gearbox, body) if _has_shaft(body) and not gearbox.gears[gear].internal else None
 
 
 def _shaft(gearbox: Gearbox, body: Body) -> list[TriangleSurface]:
@@ -251,25 +239,23 @@ def _shaft(gearbox: Gearbox, body: Body) -> list[TriangleSurface]:
         shape = gearbox.case.bodies[body.family].shape
         if shape is None or body.wheels:
             return []
-        return _pieces(shape, body)
+        # A cone is drawn as the cylinder of its mean diameter.
+        pieces = []
+        start = MM * shape.start_z_mm
+        for piece in shape.sections:
+            end_diameter = piece.outer_diameter_end_mm or piece.outer_diameter_mm
+            end = start + MM * piece.length_mm
+            diameter = 0.5 * MM * (piece.outer_diameter_mm + end_diameter)
+            pieces.append(
+                tube_surface(diameter, start, end, MM * min(piece.inner_diameter_mm, 1e3 * diameter), body.axis)
+            )
+            start = end
+        return pieces
     ends = [z + side * 0.5 * gearbox.gears[name].face_width for name, z in body.wheels.items() for side in (-1.0, 1.0)]
     ends += [bearing.position[2] for bearing in gearbox.bearings if bearing.body == body.name]
     margin = 0.02
     shaft = tube_surface(_shaft_diameter(gearbox, body), min(ends) - margin, max(ends) + margin, centre=body.axis)
     return [shaft]
-
-
-def _pieces(shape: ShapeSection, body: Body) -> list[TriangleSurface]:
-    """Return the pieces of a stepped shaft, a cone as the cylinder of its mean diameter."""
-    pieces = []
-    start = MM * shape.start_z_mm
-    for piece in shape.sections:
-        end_diameter = piece.outer_diameter_end_mm or piece.outer_diameter_mm
-        end = start + MM * piece.length_mm
-        diameter = 0.5 * MM * (piece.outer_diameter_mm + end_diameter)
-        pieces.append(tube_surface(diameter, start, end, MM * min(piece.inner_diameter_mm, 1e3 * diameter), body.axis))
-        start = end
-    return pieces
 
 
 def blank_discs(gearbox: Gearbox, body: Body) -> dict[str, tuple[float, TriangleSurface]]:
@@ -315,16 +301,11 @@ def _carrier(gearbox: Gearbox, body: Body, planets: Sequence[Body]) -> list[Tria
 
 
 def displacement_of(body: BodyShape, motion: ArrayLike) -> Floats:
-    """Return the displacement of each point of a body for a small motion.
+    """Return the displacement (n, 3), m, of each point of a body for a small motion.
 
     Parameters
     ----------
-    body : the body, n points
     motion : (6,) displacement (m) of the reference point and rotations (rad) about x, y, z
-
-    Returns
-    -------
-    (n, 3) m
     """
     return np.asarray(_displaced(body, np.asarray(motion, dtype=np.float64)))
 
@@ -355,11 +336,7 @@ def vibration_of(body: BodyShape, motion: Complexes) -> Complexes:
 
 
 def peak_displacement(vibration: Complexes) -> Floats:
-    """Return the largest distance (n,) from rest of points that move along ellipses, as Re(vibration exp(i w t)).
-
-    Parameters
-    ----------
-    vibration : (n, 3)
+    """Return the largest distance (n,) from rest of points that move along ellipses Re(vibration exp(i w t)), (n, 3).
 
     Examples
     --------
@@ -386,18 +363,13 @@ def largest_displacement(vibrations: Sequence[Complexes]) -> complex:
 
 
 def placed(body: BodyShape, motion: ArrayLike) -> Floats:
-    """Return the points of a body after a motion that may be large: a finite rotation, then a translation.
+    """Return the points (n, 3), m, of a body after a motion that may be large: a finite rotation, then a translation.
 
     Linear displacements would enlarge a gear that rotates by a drawn amplitude; a finite rotation keeps its size.
 
     Parameters
     ----------
-    body : the body, n points
     motion : (6,) as in `displacement_of`, the rotations as a rotation vector
-
-    Returns
-    -------
-    (n, 3) m
     """
     matrix = motion_matrix(body.reference, motion)
     points: Floats = body.surface.points @ matrix[:3, :3].T + matrix[:3, 3]
@@ -447,7 +419,6 @@ def mode_scene(
 
     Parameters
     ----------
-    bodies : shapes
     motions : by body name, (6,)
         Mode shape in any normalisation, as in `displacement_of`, or complex amplitudes of a vibration in operation;
         bodies that are not listed are at rest.
@@ -482,7 +453,6 @@ def motions_of(bodies: Iterable[Body], coordinates: Mapping[str, Sequence[int]],
 
     Parameters
     ----------
-    bodies : bodies of the model
     coordinates : mapping of body name to six int
         Indices of x, y, z and the rotations about them in the vector; -1 for a missing coordinate.
     shape : (size,) mode shape or displacement

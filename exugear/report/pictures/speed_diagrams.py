@@ -123,7 +123,6 @@ class Strip:
     top: float
     bottom: float
     path: str
-    """Curve as path data."""
     bands: tuple[tuple[float, float, float], ...]
     """Place, and ends of the range of damping, of each circled peak."""
     ticks: tuple[Mark, ...]
@@ -137,7 +136,6 @@ class Strips:
     frame: Frame
     strips: tuple[Strip, ...]
     words: str
-    """Content as text."""
 
 
 def strips_of(
@@ -152,11 +150,8 @@ def strips_of(
 
     Parameters
     ----------
-    curves : by quantity
     titles : title with unit, and factor from SI units, by quantity
     rated : rated speed, rpm
-    size : width and height
-    words : content as text
     """
     fastest = max(float(curve.speed[-1]) for curve in curves.values())
     low, high = ranking.speeds
@@ -285,8 +280,6 @@ def campbell_drawing(
     frequencies : (n,) of the modes, Hz
     matched : index of the mode by number of the resonance in the ranking, from 1
     rated : rated speed, rpm
-    size : width and height
-    words : content as text
     """
     shown = ranking.resonances[:NUMBERED]
     highest = HEADROOM * max(own.frequency for own in shown)

@@ -96,6 +96,8 @@ def answer_section(material: ReportData) -> Part:
         dynamic = envelopes(headline.response, headline.ranking.speeds)
         drawn = {name: dynamic[name] for name in curves}
         caption = "largest order, quasi-static ones omitted"
+    group = headline.group
+    listed = () if group is None else material.lists[group.name, headline.choice.variant]
     answer: dict[str, Any] = {
         "scope": _scope(material, headline),
         "kicker": _kicker(headline),
@@ -105,8 +107,8 @@ def answer_section(material: ReportData) -> Part:
         "sentence": _sentence(material, headline, top, mode),
         "quantities": [_quantity(material, headline, top, name) for name in sorted_quantities(headline.ranking, top)],
         "note": note_of(material, headline),
-        "caveats": _caveats(material, headline),
-        "choice": "" if headline.group is None else f"resonance:{headline.group.name}:{headline.choice.variant}:",
+        "caveats": [material.words.labelled(text) for first in listed[:1] for text in first.caveats],
+        "choice": "" if group is None else f"resonance:{group.name}:{headline.choice.variant}:",
         "strips": [_strips(material, headline, drawn, size) for size in STRIPS if drawn],
         "drawn": caption,
         "resonance": _resonance_box(material, headline, mode),
@@ -123,20 +125,16 @@ def answer_section(material: ReportData) -> Part:
     notes.extend(f"{title}: {answer[name].line}" for title, name in boxes)
     notes.extend(f"{title}: {line}" for title, lines in answer["further"] for line in lines)
     html = render("answer", answer=answer, speed_label=f"{material.input_words} speed / rpm")
-    return Part(html, {"curves": _curves(material, drawn)}, "Answer", "answer")
-
-
-def _curves(material: ReportData, curves: Mapping[str, Envelope]) -> list[dict[str, Any]]:
-    """Return the drawn curves for the readout at the cursor."""
-    return [
+    readout = [
         {
             "label": QUANTITIES[name].short,
             "unit": QUANTITIES[name].unit,
             "speeds": material.arrays.add((curve.speed / RPM).astype("f4")),
             "values": material.arrays.add((QUANTITIES[name].factor * curve.amplitude).astype("f4")),
         }
-        for name, curve in curves.items()
+        for name, curve in drawn.items()
     ]
+    return Part(html, {"curves": readout}, "Answer", "answer")
 
 
 def _scope(material: ReportData, headline: Headline) -> str:
@@ -209,14 +207,6 @@ def _quantity(material: ReportData, headline: Headline, top: Resonance, name: st
         "rank": own.place or "–",
         "place": place,
     }
-
-
-def _caveats(material: ReportData, headline: Headline) -> list[str]:
-    """Return what weakens the amplitudes of the first resonance."""
-    if headline.group is None:
-        return []
-    first = next(iter(material.lists[headline.group.name, headline.choice.variant]), None)
-    return [] if first is None else [material.words.labelled(text) for text in first.caveats]
 
 
 def _strips(

@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from exugear.gearbox.choice import choice_of
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.life.life import LEAST_OUTSIDE
 from exugear.life.life_file import draw_life, limits
-from exugear.report.findings.context import METHOD_LABELS, choice_of, model_label
+from exugear.report.findings.context import model_label, response_label
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.words import figure_text
 from exugear.report.pictures.png import png_address
 from exugear.report.sections.material import Part, ReportData, model_name
 from exugear.report.web.html import Cell, Table, render
-from exugear.steady.peaks import line_name
 from exugear.steady.steady_file import complex_amplitudes, response_quantities
 from exugear.system.bearings.duty import BearingLoadState
 from exugear.system.bearings.rolling.rows import BearingError
@@ -58,7 +58,15 @@ def bearings_section(material: ReportData) -> Part:
     duties = list(filter(None, (_duties(material, assembly) for assembly in material.context.assemblies.values())))
     lives = [_rated_variant(material, data) for data in material.ratings.lives]
     data = {} if material.ratings.sheet is None else {"rating": material.ratings.sheet.summary()}
-    _note_damage(material)
+    for life in material.ratings.lives:
+        worst = limits(life)
+        if worst:
+            part, kind, damage = worst[0]
+            size = "infinite" if math.isinf(damage) else f"{damage:.3g}"
+            material.context.notes.statements.append(
+                f"{model_label(choice_of(life.attrs))}: largest fatigue damage in "
+                f"{float(life.attrs['life_years']):g} years: {material.words.labelled(part)}, {size} ({kind})."
+            )
     if not (forces or accelerations or duties or lives):
         return Part(data=data)
     html = render(
@@ -79,8 +87,12 @@ def _forces(data: Mapping[str, Any], group: RunGroup, variant: str) -> dict[str,
         return None
     largest = max(figures["amplitude"] for figures in loudest.values())
     felt = NOISE_OF_ALL * max(max(figures["amplitude"], figures["mean"] or 0.0) for figures in loudest.values())
+    # Smaller forces are only rounding error compared with those at other bearings.
     loudest = {
-        name: {**figures, **{kind: _above(figures[kind], felt) for kind in ("mean", "amplitude")}}
+        name: {
+            **figures,
+            **{kind: own if (own := figures[kind] or 0.0) > felt else 0.0 for kind in ("mean", "amplitude")},
+        }
         for name, figures in loudest.items()
     }
     caption = f"Radial forces {Variant.of(variant).label}, {group.source}"
@@ -112,7 +124,9 @@ def _force_row(
     swings = Cell(figure_text(1e-3 * amplitude), 1e-3 * amplitude, bar=amplitude / largest)
     measures = {"amplitude / kN": swings}
     if not group.responses:
-        axial = _without_noise(1e-3 * figures["axial"], mean)
+        axial = 1e-3 * figures["axial"]
+        if not abs(axial) > NOISE * 1e-3 * mean:  # round-off, or from the start-up
+            axial = 0.0
         measures = {
             "mean radial force / kN": Cell(figure_text(1e-3 * mean), 1e-3 * mean),
             "mean axial force / kN": Cell(figure_text(axial), axial),
@@ -132,26 +146,11 @@ def _force_row(
     }
 
 
-def _above(force: float | None, felt: float) -> float:
-    """Return the force, or zero where it is only rounding error compared with the forces at other bearings."""
-    if force and force > felt:
-        return force
-    return 0.0
-
-
-def _without_noise(value: float, mean: float) -> float:
-    """Return an axial force (kN), or zero where it is negligible (round-off, start-up) against the mean force (N)."""
-    if abs(value) > NOISE * 1e-3 * mean:
-        return value
-    return 0.0
-
-
 def _accelerations(material: ReportData, data: xr.Dataset) -> dict[str, Any] | None:
     """Tabulate the largest accelerations at bearings and mounts of a steady-state response over orders and speeds."""
     kinds = {"acceleration": "bearing", "mount_acceleration": "mount"}
     amplitude = complex_amplitudes(data)[:, 1:]
     orders = data["order"].to_numpy()[1:]
-    bases = tuple(str(name) for name in data["base"].to_numpy())
     found = []
     for quantity in response_quantities(data):
         if quantity.name not in kinds:
@@ -168,20 +167,16 @@ def _accelerations(material: ReportData, data: xr.Dataset) -> dict[str, Any] | N
         if not largest > MIN_RELATIVE_ACCELERATION * found[0][0]:
             break
         speed = abs(float(data["speed"][point]))
-        index = tuple(int(n) for n in data["index"].to_numpy()[line + 1])
         rows.append(
             {
                 "at": f"{kind}: {material.words.of(place)}",
                 "acceleration / (m/s²)": Cell(figure_text(largest), largest),
-                "order": material.words.labelled(line_name(index, bases)),
+                "order": material.words.labelled(str(data["line"][line + 1].item())),
                 "speed / rpm": Cell(figure_text(speed / RPM, 4), speed / RPM),
                 "frequency / Hz": Cell(f"{orders[line] * speed / (2.0 * np.pi):.0f}"),
             }
         )
-    title = (
-        f"Accelerations at bearings and mounts: steady-state response of {model_label(choice_of(data.attrs))}, "
-        f"{METHOD_LABELS[str(data.attrs['method'])]}"
-    )
+    title = f"Accelerations at bearings and mounts: steady-state response of {response_label(data)}"
     name = f"seats-{model_name(choice_of(data.attrs))}-{data.attrs['method']}"
     table = Table(rows, ("at", "order"), caption=title, name=name, sortable=True)
     return {"model": model_name(choice_of(data.attrs)), "title": title, "table": table}
@@ -216,9 +211,7 @@ def _duties(material: ReportData, assembly: Assembly) -> dict[str, Any] | None:
 
 def _mesh_row(material: ReportData, duty: MeshLoadState) -> dict[str, object]:
     def shown(value: float, form: str) -> str:
-        if math.isnan(value):
-            return "–"
-        return format(value, form)
+        return "–" if math.isnan(value) else format(value, form)
 
     return {
         "mesh": material.words.of(duty.name),
@@ -263,19 +256,6 @@ def _life(value: float) -> Cell:
 
 LEAST_DAMAGE = 1e-6
 """Damages below this value are shown as "below" it."""
-
-
-def _note_damage(material: ReportData) -> None:
-    """Note the largest damage of each rated variant."""
-    for life in material.ratings.lives:
-        worst = limits(life)
-        if worst:
-            part, kind, damage = worst[0]
-            size = "infinite" if math.isinf(damage) else f"{damage:.3g}"
-            material.context.notes.statements.append(
-                f"{model_label(choice_of(life.attrs))}: largest fatigue damage in "
-                f"{float(life.attrs['life_years']):g} years: {material.words.labelled(part)}, {size} ({kind})."
-            )
 
 
 def _rated_variant(material: ReportData, data: xr.Dataset) -> dict[str, Any]:

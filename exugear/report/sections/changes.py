@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from exugear.gearbox.choice import choice_of
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
-from exugear.report.findings.context import OTHER_INPUT, Context, choice_of, model_label, shown_path
+from exugear.report.findings.context import OTHER_INPUT, Context, model_label, shown_path
 from exugear.report.findings.design_changes import (
     LEAST_DB,
     ChangeResult,
@@ -23,7 +24,7 @@ from exugear.report.findings.design_changes import (
 from exugear.report.findings.facts import best_words, sensitivities_of, shift_text
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.headline import Headline, headline_of_group
-from exugear.report.findings.other_design import Difference, HighestAmplitude, change_in_decibels, highest_within
+from exugear.report.findings.other_design import HighestAmplitude, change_in_decibels, highest_within
 from exugear.report.findings.parameter_variations import best_change, track_mode
 from exugear.report.findings.proposals import ASSUMPTION
 from exugear.report.findings.ranking import Envelope
@@ -36,7 +37,7 @@ from exugear.system.sensitivity import ParameterVariation
 from fe_ste.tools.files import FileError
 
 if TYPE_CHECKING:
-    import xarray as xr
+    pass
 
 CHANGES_NAME = "changes"
 """Identifier of the part."""
@@ -119,15 +120,14 @@ def study_of(study: DesignStudy | None, headline: Headline) -> DesignStudy | Non
 def best_changes(study: DesignStudy, count: int) -> list[tuple[str, str]]:
     """Return what the best recommended changes do to the highest amplitude in the range, and their texts."""
     best = [result for result in study.results if result.recommended][:count]
+    # The table has the details of a change.
     return [
-        (_decibels(result.effects[study.quantity].highest).shown + " dB", _beginning(result.change.words))
+        (
+            _decibels(result.effects[study.quantity].highest).shown + " dB",
+            result.change.words.split(" (")[0].split(",")[0],
+        )
         for result in best
     ]
-
-
-def _beginning(words: str) -> str:
-    """Return the text of a change without its details, which the table has."""
-    return words.split(" (")[0].split(",")[0]
 
 
 def _table(material: ReportData, study: DesignStudy, results: Sequence[ChangeResult], caption: str, name: str) -> Table:
@@ -191,7 +191,10 @@ def _compared(material: ReportData) -> dict[str, Any] | None:
         "amplitudes": Table(rows, caption="Two designs", name="two-designs-table"),
         "figures": figures,
         "keys": Table(
-            [_key_row(this, other.name, difference) for difference in other.differences[:SHOWN_KEYS]],
+            [
+                {"key": one.key, this: _value_text(one.own), other.name: _value_text(one.other)}
+                for one in other.differences[:SHOWN_KEYS]
+            ],
             (this, other.name),
             caption="Keys that differ",
             name="two-designs-keys",
@@ -238,11 +241,6 @@ def _number(value: float, form: str = "") -> Cell:
     return Cell((format(value, form) if form else rounded_text(value)).replace("-", "−"), value)
 
 
-def _key_row(this: str, other: str, difference: Difference) -> dict[str, Any]:
-    values = map(_value_text, (difference.own, difference.other))
-    return {"key": difference.key, **dict(zip((this, other), values, strict=True))}
-
-
 def _value_text(value: Any) -> str:
     if value is None:
         return "–"
@@ -268,18 +266,6 @@ def _sensitivity(material: ReportData, group: RunGroup) -> dict[str, Any] | None
         f"{material.words.moves(modes, mode)}."
     )
     varied = next((one.variations for one in material.variations if one.choice == own.choice), ())
-    return {
-        "name": group.name,
-        "scope": scope,
-        "table": _sensitivity_table(material, group, modes, mode),
-        "variations": [
-            _variation(material, f"variation-{group.name}-{number}", variation, frequency)
-            for number, variation in enumerate(varied)
-        ],
-    }
-
-
-def _sensitivity_table(material: ReportData, group: RunGroup, modes: xr.Dataset, mode: int) -> Table:
     sensitivities = sensitivities_of(material.words, modes, mode)
     largest = max((abs(sensitivity.shift) for sensitivity in sensitivities), default=1.0)
     kinds = [
@@ -299,7 +285,15 @@ def _sensitivity_table(material: ReportData, group: RunGroup, modes: xr.Dataset,
         for sensitivity in own
     ]
     caption = "First-order frequency shifts of the mode of the first resonance"
-    return Table(rows, ("of",), caption=caption, name=f"levers-{group.name}", sortable=True)
+    return {
+        "name": group.name,
+        "scope": scope,
+        "table": Table(rows, ("of",), caption=caption, name=f"levers-{group.name}", sortable=True),
+        "variations": [
+            _variation(material, f"variation-{group.name}-{number}", variation, frequency)
+            for number, variation in enumerate(varied)
+        ],
+    }
 
 
 def _variation(material: ReportData, name: str, variation: ParameterVariation, frequency: float) -> tuple[Figure, str]:

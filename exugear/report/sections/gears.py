@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -39,6 +39,23 @@ def gears_section(material: ReportData) -> Part:
     found = excitations(material.context, material.results)
     ripples = {own.pair: own for own in found}
     curves = [Curve(material.words.of(own.pair), own.position, 1e6 * (own.error - own.error.mean())) for own in found]
+    gearbox = material.context.gearbox
+    rows = []
+    for name, gear in gearbox.gears.items():
+        rows.append(
+            {
+                "gear": material.words.of(name),
+                "teeth": gear.teeth,
+                "kind": "internal" if gear.internal else "external",
+                "module / mm": f"{1e3 * gear.normal_module:g}",
+                "pressure angle / °": f"{math.degrees(gear.normal_pressure_angle):g}",
+                "helix angle / °": f"{math.degrees(gear.helix_angle):g}",
+                "profile shift": f"{gear.profile_shift:g}",
+                "face width / mm": f"{1e3 * gear.face_width:g}",
+                "tip diameter / mm": f"{2e3 * gear.tip_radius:.2f}",
+                "root diameter / mm": f"{2e3 * gear.root_radius:.2f}",
+            }
+        )
     html = render(
         "gears",
         scope="" if headline is None else f"Static load, no load factors. Model: {model_label(headline.choice)}.",
@@ -58,28 +75,31 @@ def gears_section(material: ReportData) -> Part:
             curves,
             [ChartAxis("position in the mesh cycle"), ChartAxis("transmission error / µm")],
         ),
-        errors=Table([_row(material, own) for own in found], caption="Static transmission error", name="errors"),
+        errors=Table(
+            [
+                {
+                    "pair": material.words.of(own.pair),
+                    "torque on gear 1 / N m": f"{own.torque:.1f}",
+                    "positions": own.position.size,
+                    "mean / µm": f"{1e6 * float(own.error.mean()):.2f}",
+                    "peak-to-peak / µm": Cell(f"{_swing(own):.3f}", _swing(own)),
+                    "mean mesh stiffness / (N/µm)": f"{1e-6 * float(own.stiffness.mean()):.0f}",
+                    "ISO 6336-1 B / (N/µm)": f"{1e-6 * own.iso_stiffness:.0f}",
+                }
+                for own in found
+            ],
+            caption="Static transmission error",
+            name="errors",
+        ),
         stresses=Table(_stress_rows(material, found), caption="Contact stresses", name="stresses"),
         harmonics=Table([_harmonics_row(material, own) for own in found], caption="Harmonics", name="harmonics"),
-        gears=Table(_gear_rows(material), caption="Gears", name="gear-data"),
+        gears=Table(rows, caption="Gears", name="gear-data"),
     )
     return Part(html, title="Gears", name="gears")
 
 
 def _swing(excitation: PairExcitation) -> float:
     return 1e6 * float(np.ptp(excitation.error))
-
-
-def _row(material: ReportData, excitation: PairExcitation) -> dict[str, object]:
-    return {
-        "pair": material.words.of(excitation.pair),
-        "torque on gear 1 / N m": f"{excitation.torque:.1f}",
-        "positions": excitation.position.size,
-        "mean / µm": f"{1e6 * float(excitation.error.mean()):.2f}",
-        "peak-to-peak / µm": Cell(f"{_swing(excitation):.3f}", _swing(excitation)),
-        "mean mesh stiffness / (N/µm)": f"{1e-6 * float(excitation.stiffness.mean()):.0f}",
-        "ISO 6336-1 B / (N/µm)": f"{1e-6 * excitation.iso_stiffness:.0f}",
-    }
 
 
 def _stress_rows(material: ReportData, found: Iterable[PairExcitation]) -> list[dict[str, object]]:
@@ -90,7 +110,10 @@ def _stress_rows(material: ReportData, found: Iterable[PairExcitation]) -> list[
         pair = material.context.gearbox.pairs[own.pair].pair
         nominal = nominal_contact_stress(pair, own.torque / pair.pinion.reference_radius)
         actual = misaligned.get(own.pair)
-        rated = _rated(material, own.pair)
+        sheet = material.ratings.sheet
+        families = {mesh.family for mesh in material.context.gearbox.meshes if mesh.pair.name == own.pair}
+        flanks = [] if sheet is None else [flank.standard for flank in sheet.flanks if flank.family in families]
+        rated = max(flanks, key=lambda standard: standard.get("sigma_H", 0.0), default={})
         rows.append(
             {
                 "pair": material.words.of(own.pair),
@@ -128,14 +151,6 @@ def _misaligned(material: ReportData) -> dict[str, MeshLoadState]:
     return {pairs[state.name]: state for state in sorted(states, key=lambda state: state.pressure)}
 
 
-def _rated(material: ReportData, pair: str) -> Mapping[str, float]:
-    """Return the factors and stresses to ISO 6336 of the flank of a pair with the largest contact stress."""
-    sheet = material.ratings.sheet
-    families = {mesh.family for mesh in material.context.gearbox.meshes if mesh.pair.name == pair}
-    flanks = [] if sheet is None else [flank.standard for flank in sheet.flanks if flank.family in families]
-    return max(flanks, key=lambda standard: standard.get("sigma_H", 0.0), default={})
-
-
 def _harmonics_row(material: ReportData, excitation: PairExcitation) -> dict[str, object]:
     largest = max(float(excitation.harmonics.max()), 1e-300)
     cells = {
@@ -143,27 +158,6 @@ def _harmonics_row(material: ReportData, excitation: PairExcitation) -> dict[str
         for n, value in enumerate(excitation.harmonics[:HARMONICS])
     }
     return {"pair": material.words.of(excitation.pair), **cells}
-
-
-def _gear_rows(material: ReportData) -> list[dict[str, object]]:
-    gearbox = material.context.gearbox
-    rows = []
-    for name, gear in gearbox.gears.items():
-        rows.append(
-            {
-                "gear": material.words.of(name),
-                "teeth": gear.teeth,
-                "kind": "internal" if gear.internal else "external",
-                "module / mm": f"{1e3 * gear.normal_module:g}",
-                "pressure angle / °": f"{math.degrees(gear.normal_pressure_angle):g}",
-                "helix angle / °": f"{math.degrees(gear.helix_angle):g}",
-                "profile shift": f"{gear.profile_shift:g}",
-                "face width / mm": f"{1e3 * gear.face_width:g}",
-                "tip diameter / mm": f"{2e3 * gear.tip_radius:.2f}",
-                "root diameter / mm": f"{2e3 * gear.root_radius:.2f}",
-            }
-        )
-    return rows
 
 
 # Contact of the teeth
@@ -231,7 +225,6 @@ def _pair(material: ReportData, own: PairContact, ripple: PairExcitation | None)
 
 
 def _data_sheet(own: PairContact, ripple: PairExcitation | None) -> Table:
-    """List the geometry and the excitation of a pair."""
     gears = (own.pair.pinion, own.pair.gear)
 
     def both(values: Iterable[float], digits: str) -> str:

@@ -70,11 +70,8 @@ class ReportData:
     lists: Mapping[tuple[str, str], tuple[ListedResonance, ...]]
     """List of resonances by result group and variant."""
     ratings: Ratings = field(default_factory=Ratings)
-    """Stored lives and rating sheet."""
     design_study: DesignStudy | None = None
-    """Computed design changes."""
     other_design: OtherDesign | None = None
-    """Another design that is compared."""
     missing: tuple[str, ...] = ()
     """Results that the folder lacks, with their commands."""
     run_data: Mapping[str, Any] = field(default_factory=dict)

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from exugear.gearbox.choice import choice_of
 from exugear.gearbox.units import RPM
-from exugear.report.findings.context import choice_of, model_label
+from exugear.report.findings.context import model_label
 from exugear.report.sections.material import ChartAxis, Curve, ReportData, model_name
 from exugear.report.web.html import Cell, Figure, Table
 from exugear.steady.evaluation.measured_comparison import DRAWN_RANGE, DRAWN_UNITS
@@ -75,9 +76,9 @@ def _row(material: ReportData, peak: dict[str, Any]) -> dict[str, object]:
     """Return a row of the table of peaks; a side without the peak has no speed."""
     unit, factor = DRAWN_UNITS[peak["unit"]]
 
-    def number(key: str, form: str, scale: float = 1.0) -> Cell:
+    def number(key: str, form: str) -> Cell:
         value = peak[key]
-        return Cell("none", float("nan")) if value is None else Cell(format(scale * value, form), scale * value)
+        return Cell("none", float("nan")) if value is None else Cell(format(value, form), value)
 
     return {
         "order": material.words.labelled(peak["order"]),

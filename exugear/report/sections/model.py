@@ -5,23 +5,22 @@ from __future__ import annotations
 import json
 import math
 import platform
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from exugear.gearbox.choice import Choice
+from exugear.gearbox.choice import Choice, choice_of
 from exugear.gearbox.load_cases import static_load_in_words
 from exugear.gearbox.units import RPM
 from exugear.report.findings.context import (
     MESH_MODEL_LABELS,
-    METHOD_LABELS,
     REFERENCE_VARIANT,
     VISIBLE_SHARE,
-    choice_of,
     model_label,
+    response_label,
 )
 from exugear.report.findings.facts import facts_of
 from exugear.report.findings.groups import RunGroup
@@ -30,7 +29,6 @@ from exugear.report.pictures.png import png_address
 from exugear.report.sections.material import ChartAxis, Curve, Part, ReportData, group_words, model_name
 from exugear.report.web.document import libraries, licences
 from exugear.report.web.html import Cell, Figure, Table, render
-from exugear.results.findings import Finding
 from exugear.results.folder import StoredStudy, stored_studies, times_spent
 from exugear.results.run_file import invalidity_of
 from exugear.results.solver_comparison import EXUDYN_FOLDER, compare_solvers
@@ -89,6 +87,21 @@ def model_section(material: ReportData) -> Part:
     results = material.results
     groups = _compared_groups(material)
     inputs = [{"key": key, "value": value} for key, value in flat_keys(material.context.gearbox.content)]
+    gearbox = material.context.gearbox
+    case = material.context.gearbox.case
+    acceleration = np.linalg.norm(case.gravity.acceleration_m_per_s2)
+    listed = [
+        f"Inertia sets: {', '.join(gearbox.inertia_sets)}; default {case.default_inertias}.",
+        f"Housing stiffness factor of bearings in the housing: {case.housing.factor:g}.",
+        f"Damping: {damping_in_words(case.damping)}.",
+        f"Gravity {'off' if acceleration == 0.0 else f'{acceleration:.2f} m/s²'}.",
+        f"Mesh stiffness at the static load, {static_load_in_words(gearbox)}; meshes are bilateral (they transmit "
+        "tension); the time with tensile mesh force is recorded.",
+        "Modes: linearised at the static load, mesh stiffness averaged over the mesh cycle.",
+        *_elastic_words(material),
+    ]
+    if friction := case.damping.tooth_friction:
+        listed.append(f"Friction of teeth in runs and steady-state responses: coefficient {friction:g}.")
     html = render(
         "model",
         groups=groups,
@@ -97,7 +110,7 @@ def model_section(material: ReportData) -> Part:
         studies=list(map(_study, stored_studies(material.context.folder, material.context.gearbox))),
         notes=material.context.notes,
         missing=material.missing,
-        assumptions=_assumptions(material),
+        assumptions=[*listed, *_deviation_words(material), *_excitation_words(material)],
         source=material.file_words,
         runs=Table(
             [_run_row(material, run) for run in results.runs],
@@ -137,27 +150,7 @@ def model_section(material: ReportData) -> Part:
     return Part(html, title="Model and checks", name="model")
 
 
-def _assumptions(material: ReportData) -> list[str]:
-    gearbox = material.context.gearbox
-    case = material.context.gearbox.case
-    acceleration = np.linalg.norm(case.gravity.acceleration_m_per_s2)
-    listed = [
-        f"Inertia sets: {', '.join(gearbox.inertia_sets)}; default {case.default_inertias}.",
-        f"Housing stiffness factor of bearings in the housing: {case.housing.factor:g}.",
-        f"Damping: {damping_in_words(case.damping)}.",
-        f"Gravity {'off' if acceleration == 0.0 else f'{acceleration:.2f} m/s²'}.",
-        f"Mesh stiffness at the static load, {static_load_in_words(gearbox)}; meshes are bilateral (they transmit "
-        "tension); the time with tensile mesh force is recorded.",
-        "Modes: linearised at the static load, mesh stiffness averaged over the mesh cycle.",
-        *_elastic_words(material),
-    ]
-    if friction := case.damping.tooth_friction:
-        listed.append(f"Friction of teeth in runs and steady-state responses: coefficient {friction:g}.")
-    return [*listed, *_deviation_words(material), *_excitation_words(material)]
-
-
 def _deviation_words(material: ReportData) -> Iterator[str]:
-    """List the gears with deviations."""
     gears = []
     for (body, gear), deviation in material.context.gearbox.deviations.items():
         pitch = float(np.ptp(deviation.pitch)) if deviation.pitch.size else 0.0
@@ -175,7 +168,8 @@ def _excitation_words(material: ReportData) -> Iterator[str]:
     for load in context.gearbox.varying_loads:
         orders.setdefault((load.excitation, load.body), set()).add(load.order)
     acting = [
-        f"{material.words.of(name)} ({_several('order', sorted(own))} of {material.words.of(body)})"
+        f"{material.words.of(name)} (order{'s' * (len(own) > 1)} {', '.join(f'{number:g}' for number in sorted(own))} "
+        f"of {material.words.of(body)})"
         for (name, body), own in orders.items()
     ]
     if acting:
@@ -183,10 +177,6 @@ def _excitation_words(material: ReportData) -> Iterator[str]:
     names = {name for name, _ in orders}
     if without := [material.words.of(name) for name in context.gearbox.case.excitations if name not in names]:
         yield f"Excitations of the file that are left out: {', '.join(without)}."
-
-
-def _several(word: str, numbers: Sequence[float]) -> str:
-    return f"{word}{'s' * (len(numbers) > 1)} {', '.join(f'{number:g}' for number in numbers)}"
 
 
 def _elastic_words(material: ReportData) -> Iterator[str]:
@@ -243,7 +233,7 @@ def _exudyn_comparison(material: ReportData, run: VariantRun) -> Figure | None:
 def _response_row(data: xr.Dataset) -> dict[str, object]:
     speed = np.abs(data["speed"].to_numpy()) / RPM
     return {
-        "steady-state response": f"{model_label(choice_of(data.attrs))}, {METHOD_LABELS[str(data.attrs['method'])]}",
+        "steady-state response": response_label(data),
         "speeds": data.sizes["point"],
         "lowest speed / rpm": f"{speed.min():.1f}",
         "highest speed / rpm": f"{speed.max():.1f}",
@@ -292,8 +282,7 @@ def _hashes(material: ReportData) -> list[dict[str, str]]:
     hashes = {f"table {name}": table.input_hash for name, table in results.tables.items()}
     hashes |= {str(context.name_of(run.path)): run.attributes["input_hash"] for run in results.runs}
     for data in results.steady:
-        method = METHOD_LABELS[str(data.attrs["method"])]
-        hashes[f"steady-state response {model_label(choice_of(data.attrs))}, {method}"] = data.attrs["input_hash"]
+        hashes[f"steady-state response {response_label(data)}"] = data.attrs["input_hash"]
     hashes |= {f"modes {model_label(model)}": data.attrs["input_hash"] for model, data in results.modes.items()}
     return [{"result": name, "SHA-256 of its input": sha256} for name, sha256 in hashes.items()]
 
@@ -314,7 +303,8 @@ def _compared_groups(material: ReportData) -> list[dict[str, Any]]:
     content = []
     for group in material.groups:
         facts = facts_of(material.context, material.words, group, material.variations)
-        verdicts = _checks(material, group)
+        found = validity_checks(material.context, group)
+        verdicts = [replace(finding, text=material.words.labelled(finding.text)) for finding in found]
         if group is material.groups[0]:
             notes.findings.extend(verdicts)
             notes.statements.extend(f"{verdict.line}." for verdict in verdicts)
@@ -324,22 +314,26 @@ def _compared_groups(material: ReportData) -> list[dict[str, Any]]:
             notes.statements.extend(f"{several}: {fact.line}" for fact in facts)
             if group is not material.groups[0]:
                 notes.statements.extend(f"{several}: {verdict.line}." for verdict in verdicts)
-        content.append({"name": group.name, "scope": _scope(material, group), "facts": facts, "verdicts": verdicts})
-        _note_comparisons(material, group)
+        content.append(
+            {
+                "name": group.name,
+                "scope": (
+                    f"{group.title[0].upper()}{group.title[1:]}. Load: {_load_of(material, group)}. Speeds: of the "
+                    f"{material.input_words}. Levels: overall transmission error (TE), 0 dB = 1 µm."
+                ),
+                "facts": facts,
+                "verdicts": verdicts,
+            }
+        )
+        for variant, comparison in group.comparisons.items():
+            reference = comparison.second.variant
+            here = _only(group, variant, reference)
+            there = _only(group, reference, variant)
+            material.context.notes.statements.append(
+                f"Resonances in {variant} and not in {reference} ({group.title}): {here}. In {reference} and not in "
+                f"{variant}: {there}."
+            )
     return content
-
-
-def _checks(material: ReportData, group: RunGroup) -> list[Finding]:
-    """Return the checks of a group with the labels of parts."""
-    found = validity_checks(material.context, group)
-    return [replace(finding, text=material.words.labelled(finding.text)) for finding in found]
-
-
-def _scope(material: ReportData, group: RunGroup) -> str:
-    return (
-        f"{group.title[0].upper()}{group.title[1:]}. Load: {_load_of(material, group)}. Speeds: of the "
-        f"{material.input_words}. Levels: overall transmission error (TE), 0 dB = 1 µm."
-    )
 
 
 def _load_of(material: ReportData, group: RunGroup) -> str:
@@ -350,18 +344,6 @@ def _load_of(material: ReportData, group: RunGroup) -> str:
     if loads and not group.responses:
         text = f"{'; '.join(loads)} (tables and steady-state responses: {text})"
     return material.words.labelled(text)
-
-
-def _note_comparisons(material: ReportData, group: RunGroup) -> None:
-    """Note resonances that only one of two variants has; window-dependent ones are not counted."""
-    for variant, comparison in group.comparisons.items():
-        reference = comparison.second.variant
-        here = _only(group, variant, reference)
-        there = _only(group, reference, variant)
-        material.context.notes.statements.append(
-            f"Resonances in {variant} and not in {reference} ({group.title}): {here}. In {reference} and not in "
-            f"{variant}: {there}."
-        )
 
 
 def _only(group: RunGroup, variant: str, other: str) -> str:
@@ -376,19 +358,6 @@ def _only(group: RunGroup, variant: str, other: str) -> str:
 # Modes near a target frequency from the gearbox file or the command line, such as a measured one
 
 
-@dataclass(frozen=True)
-class ModelMatch:
-    """Parameter change that shifts a mode of a model to the target frequency."""
-
-    model: Choice
-    match: FrequencyMatch
-
-    @property
-    def assumption(self) -> str:
-        """Parameter with its value."""
-        return f"{self.match.parameter.label} = {self.match.value:.3g}"
-
-
 def _target(material: ReportData) -> dict[str, Any] | None:
     """List the modes near the target frequency, and parameter changes that would shift a mode there."""
     target = material.context.target
@@ -401,35 +370,41 @@ def _target(material: ReportData) -> dict[str, Any] | None:
         visible = nearest_mode(data, target, VISIBLE_SHARE)
         if nearest is None or visible is None:
             continue
-        rows += [
-            _near_row(material, model, data, mode, target) for mode in dict.fromkeys([nearest.index, visible.index])
-        ]
+        for place in dict.fromkeys([nearest.index, visible.index]):
+            mode = report_mode(data, place)
+            near = {
+                "frequency / Hz": f"{mode.frequency:.1f}",
+                "near": "yes" if mode.is_near(target) else "no",
+                "damping / %": f"{100 * mode.damping_ratio:.2f}",
+            }
+            words = material.words.moves(data, place)
+            rows.append({**_model_cells(model), **near, **_mode_cells(material, mode), "mode shape": words})
         material.context.notes.statements.append(_statement(model, data, nearest, visible, target))
+    found = [
+        (variation.choice, match)
+        for variation in material.variations
+        for match in frequency_matches(variation.variations, target, VISIBLE_SHARE)
+    ]
+    if found:
+        entries = "; ".join(
+            f"{match.parameter.label} = {match.value:.3g} instead of {match.parameter.default:g} "
+            f"({model_label(model)}: {match.frequency:.0f} Hz)"
+            for model, match in found
+        )
+        material.context.notes.statements.append(
+            f"Assumptions that shift a mode with TE participation to {target:.0f} Hz: {entries}."
+        )
     return {
         "target": target,
         "near": Table(rows, ("inertia set", "mode shape"), caption=f"Modes near {target:.0f} Hz", name="near"),
         "visible": 100 * VISIBLE_SHARE,
         "within": 100 * NEAR,
         "matches": Table(
-            _matches(material, target),
+            [_match_row(material, model, match, target) for model, match in found],
             ("inertia set", "assumption", "mode shape"),
             caption="Assumptions",
             name="matches",
         ),
-    }
-
-
-def _near_row(material: ReportData, model: Choice, data: xr.Dataset, index: int, target: float) -> dict[str, object]:
-    mode = report_mode(data, index)
-    return {
-        "variant": model.variant,
-        "inertia set": f"{model.inertias} ({MESH_MODEL_LABELS[model.mesh_model]})",
-        "frequency / Hz": f"{mode.frequency:.1f}",
-        "near": "yes" if mode.is_near(target) else "no",
-        "damping / %": f"{100 * mode.damping_ratio:.2f}",
-        "TE part. / %": f"{100 * mode.share:.1f}",
-        "amplification": Cell(f"{mode.amplification:.2f} ({material.words.of(mode.mesh)})", mode.amplification),
-        "mode shape": material.words.moves(data, index),
     }
 
 
@@ -452,55 +427,36 @@ def _statement(model: Choice, data: xr.Dataset, nearest: ModeReport, visible: Mo
     )
 
 
-def _matches(material: ReportData, target: float) -> list[dict[str, object]]:
-    """Return the rows of the parameter changes that shift a mode to the target."""
-    found = [
-        ModelMatch(variation.choice, match)
-        for variation in material.variations
-        for match in frequency_matches(variation.variations, target, VISIBLE_SHARE)
-    ]
-    if found:
-        entries = "; ".join(
-            f"{own.assumption} instead of {own.match.parameter.default:g} ({model_label(own.model)}: "
-            f"{own.match.frequency:.0f} Hz)"
-            for own in found
-        )
-        material.context.notes.statements.append(
-            f"Assumptions that shift a mode with TE participation to {target:.0f} Hz: {entries}."
-        )
-    return [_match_row(material, own, target) for own in found]
+def _model_cells(model: Choice) -> dict[str, object]:
+    return {"variant": model.variant, "inertia set": f"{model.inertias} ({MESH_MODEL_LABELS[model.mesh_model]})"}
 
 
-def _match_row(material: ReportData, found: ModelMatch, target: float) -> dict[str, object]:
-    match = found.match
-    data = match.modes.to_dataset()
-    mode = report_mode(data, match.index)
+def _mode_cells(material: ReportData, mode: ModeReport) -> dict[str, object]:
     return {
-        "variant": found.model.variant,
-        "inertia set": f"{found.model.inertias} ({MESH_MODEL_LABELS[found.model.mesh_model]})",
-        "assumption": material.words.change(match.parameter.label, match.value, match.parameter.default),
-        "frequency / Hz": f"{mode.frequency:.0f}",
         "TE part. / %": f"{100 * mode.share:.1f}",
         "amplification": Cell(f"{mode.amplification:.2f} ({material.words.of(mode.mesh)})", mode.amplification),
-        (
-            f"nearest with TE participation in {REFERENCE_VARIANT} / Hz"
-        ): f"{_reference_frequency(material, found, target):.0f}",
-        "mode shape": material.words.moves(data, match.index),
     }
 
 
-def _reference_frequency(material: ReportData, found: ModelMatch, target: float) -> float:
-    """Return the frequency (Hz) of the nearest visible mode of the reference variant with the same parameter value."""
+def _match_row(material: ReportData, model: Choice, match: FrequencyMatch, target: float) -> dict[str, object]:
+    """Return a parameter change, with the nearest visible mode of the reference variant for the same value."""
     context = material.context
-    match = found.match
-    reference = replace(found.model, variant=REFERENCE_VARIANT)
-    parameters = assumed_parameters(context.gearbox, reference, context.stiffness(found.model.mesh_model))
+    reference = replace(model, variant=REFERENCE_VARIANT)
+    parameters = assumed_parameters(context.gearbox, reference, context.stiffness(model.mesh_model))
     same = next((parameter for parameter in parameters if parameter.label == match.parameter.label), None)
     assembly = same.build(match.value) if same else context.assembled(reference)
     nearest = nearest_mode(modes_of(assembly).to_dataset(), target, VISIBLE_SHARE)
-    if nearest:
-        return nearest.frequency
-    return math.nan
+    frequency = nearest.frequency if nearest else math.nan
+    data = match.modes.to_dataset()
+    mode = report_mode(data, match.index)
+    return {
+        **_model_cells(model),
+        "assumption": material.words.change(match.parameter.label, match.value, match.parameter.default),
+        "frequency / Hz": f"{mode.frequency:.0f}",
+        **_mode_cells(material, mode),
+        f"nearest with TE participation in {REFERENCE_VARIANT} / Hz": f"{frequency:.0f}",
+        "mode shape": material.words.moves(data, match.index),
+    }
 
 
 # Studies

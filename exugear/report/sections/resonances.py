@@ -10,19 +10,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from exugear.gearbox.choice import Choice
+from exugear.gearbox.choice import Choice, choice_of
 from exugear.gearbox.load_cases import static_load_in_words, summarise_loads
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.sections.entries import GROUND
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
-from exugear.report.findings.context import METHOD_LABELS, Context, choice_of, model_label
+from exugear.report.findings.context import Context, model_label, response_label
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.headline import Headline
 from exugear.report.findings.ranking import HOUSING, SHAFTS, Ranking, Resonance, is_over_speed
 from exugear.report.findings.resonance_list import ListedResonance
 from exugear.report.findings.words import QUANTITIES, figure_text, percentages, rounded_text
-from exugear.report.pictures.speed_diagrams import NUMBERED, CampbellDrawing, campbell_drawing
+from exugear.report.pictures.speed_diagrams import NUMBERED, campbell_drawing
 from exugear.report.sections.material import ChartAxis, Curve, Part, ReportData, model_name
 from exugear.report.sections.measured import measured_run_ups
 from exugear.report.sections.run_data import is_found_always
@@ -34,7 +34,7 @@ from exugear.results.spectra.resonances import MAX_SWEEP_RATIO, run_up_cut, swee
 from exugear.results.spectra.run_spectra import WINDOW_FACTORS, AbsenceRule, VariantRun, report_mode
 from exugear.results.spectra.waterfall import OrderLine, order_lines
 from exugear.steady.campbell import Campbell, campbell_from
-from exugear.steady.peaks import Peak, line_name, peaks, planet_sidebands, sidebands
+from exugear.steady.peaks import Peak, peaks, planet_sidebands, sidebands
 from exugear.steady.steady_file import settings_of
 from fe_ste.tools.arrays import Floats
 
@@ -118,13 +118,11 @@ def _of_group(material: ReportData, group: RunGroup, variant: str) -> dict[str, 
         "group": group.name,
         "variant": variant,
         "title": title,
-        "range": range_text(ranking),
-        "whole": ranking.whole,
         "count": f"{inside}" if inside >= total else f"first {inside} of {total}",
         "table": replace(table, choices=[f"{prefix}{number}" for number in range(len(listed))]),
         "choice": prefix,
         "note": _list_note(material, ranking, bool(group.responses)),
-        "campbell": _campbells(material, ranking, listed, group.runs[variant].modes),
+        **_drawn(material, ranking, listed, group.runs[variant].modes),
     }
 
 
@@ -139,18 +137,15 @@ def _of_estimate(material: ReportData, headline: Headline) -> dict[str, Any]:
         listed.append(
             ListedResonance(OrderLine(own.line, own.order), abs(own.speed), own.frequency, level, True, mode, own)
         )
-    rows = _response_rows(material, ranking, listed)
     return {
         "group": None,
         "variant": None,
         "title": f"{Variant.of(headline.choice.variant).label.capitalize()}, {headline.source}",
-        "range": range_text(ranking),
-        "whole": ranking.whole,
         "count": f"{len(listed)}",
-        "table": _table(rows, listed, "Resonances", "resonances"),
+        "table": _table(_response_rows(material, ranking, listed), listed, "Resonances", "resonances"),
         "choice": "",
         "note": "Zero-to-peak amplitudes of single orders. " + note_of(material, headline),
-        "campbell": _campbells(material, ranking, listed, headline.modes),
+        **_drawn(material, ranking, listed, headline.modes),
     }
 
 
@@ -159,12 +154,6 @@ def _table(rows: list[dict[str, object]], listed: Sequence[ListedResonance], cap
     texts = ("excited by", "place", "mode shape", "strain energy")
     hidden = ("from rated / %", "place", "mode", "prominence / dB", "± µm", "strain energy")
     return Table(rows, texts, caption=caption, name=name, sortable=True, stacked=True, hidden=hidden, kinds=kinds)
-
-
-def range_text(ranking: Ranking) -> str:
-    """Return the evaluated speeds as text."""
-    low, high = (rounded_text(speed / RPM) for speed in ranking.speeds)
-    return f"{low} to {high} rpm"
 
 
 def note_of(material: ReportData, headline: Headline) -> str:
@@ -186,7 +175,6 @@ def _ranked_by(material: ReportData, ranking: Ranking) -> str:
 
 
 def _list_note(material: ReportData, ranking: Ranking, at_constant: bool) -> str:
-    """Say what the amplitudes of a list are of."""
     if not at_constant:
         return "Levels of the overall transmission error in the run-up, dB re 1 µm."
     text = "Zero-to-peak amplitudes of single orders"
@@ -214,7 +202,6 @@ def _response_rows(
     group: RunGroup | None = None,
     variant: str = "",
 ) -> list[dict[str, object]]:
-    """Return the rows of resonances with all quantities and their ranks."""
     largest: dict[str, float] = {}
     for own in (own for own in listed if own.inside):
         for name, amplitude in (own.resonance.amplitudes if own.resonance else {}).items():
@@ -245,7 +232,6 @@ def _response_rows(
 def _run_rows(
     material: ReportData, group: RunGroup, variant: str, listed: Sequence[ListedResonance]
 ) -> list[dict[str, object]]:
-    """Return the rows of resonances of a run-up, with their checks."""
     if group.responses:
         return []
     rows = []
@@ -312,18 +298,18 @@ def _mode_cells(material: ReportData, group: RunGroup | None, variant: str, own:
 
 
 def _number(value: int | None) -> Cell:
-    if value is None:
-        return Cell("–", math.nan)
-    return Cell(str(value), value)
+    return Cell("–", math.nan) if value is None else Cell(str(value), value)
 
 
-def _campbells(
+def _drawn(
     material: ReportData, ranking: Ranking, listed: Sequence[ListedResonance], modes: xr.Dataset | None
-) -> list[CampbellDrawing]:
-    """Draw orders and modes with the first resonances of a list, for windows of desktops and phones."""
+) -> dict[str, Any]:
+    """Return the speeds of a list, and orders and modes with its first resonances, for desktops and phones."""
+    low, high = (rounded_text(speed / RPM) for speed in ranking.speeds)
+    evaluated = {"range": f"{low} to {high} rpm", "whole": ranking.whole}
     inside = [own for own in listed if own.inside][:SHOWN]
     if not inside:
-        return []
+        return {**evaluated, "campbell": []}
     drawn = tuple(Resonance(own.line.name, own.line.order, own.speed, own.frequency, {}) for own in inside)
     matched = {number: own.mode for number, own in enumerate(inside, start=1) if own.mode is not None}
     frequencies = np.zeros(0) if modes is None else modes["frequency"].to_numpy()
@@ -335,7 +321,8 @@ def _campbells(
     words = "Orders are lines through the origin, modes are horizontal lines; circles have the numbers of the list."
     shown = replace(ranking, resonances=drawn)
     known = matched if modes is not None else {}
-    return [campbell_drawing(shown, lines, frequencies, known, rated, size, words) for size in CAMPBELL]
+    drawings = [campbell_drawing(shown, lines, frequencies, known, rated, size, words) for size in CAMPBELL]
+    return {**evaluated, "campbell": drawings}
 
 
 # All modes of each model
@@ -367,7 +354,6 @@ def _all_modes(material: ReportData, model: Choice, data: xr.Dataset) -> Table:
 
 
 def _note_growth(material: ReportData) -> None:
-    """Note models with growing disturbances."""
     for model, data in material.results.modes.items():
         growth = float(data.attrs["growth_rate"])
         if growth > 0.0:
@@ -401,7 +387,7 @@ def _response(material: ReportData, data: xr.Dataset) -> dict[str, Any]:
     choice = choice_of(data.attrs)
     level = str(data.attrs["method"])
     runs = [run for run in material.results.runs if choice_of(run.attributes) == choice]
-    label = f"{model_label(choice)}, {METHOD_LABELS[level]}"
+    label = response_label(data)
     context.tell(f"steady-state response, {label}")
     found = peaks(data)[:PEAKS]
     rates = {str(run.attributes["load_case"]): _unit_rate(run) for run in runs}
@@ -481,17 +467,13 @@ def _order_charts(material: ReportData, data: xr.Dataset, runs: Sequence[Variant
 
 
 def _contributions_table(material: ReportData, data: xr.Dataset, name: str) -> Table:
-    """Tabulate the contributions to the strongest resonances (method `linear`)."""
     labelled = material.words.labelled
-    bases = tuple(str(name) for name in data["base"].to_numpy())
-    index = data["index"].to_numpy()
     rows = []
     for peak in json.loads(data.attrs["contributions"]):
-        line = peak["line"]
         speed = abs(float(peak["speed"]))
         rows.append(
             {
-                "order": labelled(line_name(tuple(int(n) for n in index[line]), bases)),
+                "order": labelled(str(data["line"][peak["line"]].item())),
                 "speed / rpm": f"{speed / RPM:.2f}",
                 "excited by": labelled(shares(peak["meshes"].items())),
                 "of this, moment of the shuttling load": labelled(shares(peak.get("shuttling", {}).items())) or "–",
@@ -500,14 +482,7 @@ def _contributions_table(material: ReportData, data: xr.Dataset, name: str) -> T
                 "sensitivity to inertia of": labelled(strongest(peak["bodies"])),
             }
         )
-    texts = (
-        "order",
-        "excited by",
-        "of this, moment of the shuttling load",
-        "responding modes",
-        "sensitivity to stiffness of",
-        "sensitivity to inertia of",
-    )
+    texts = [heading for heading in (rows[0] if rows else ()) if heading != "speed / rpm"]
     return Table(rows, texts, caption="Contributions to resonances", name=name)
 
 
@@ -579,8 +554,6 @@ def _mode_rows(
     material: ReportData, diagram: Campbell, data: xr.Dataset, crossings: Sequence[Mapping[str, float]]
 ) -> list[dict[str, object]]:
     """Return the rows of the modes, most excited first."""
-    bases = tuple(str(name) for name in data["base"].to_numpy())
-    index = data["index"].to_numpy()
     strongest: dict[int, Mapping[str, float]] = {}
     for crossing in crossings:
         mode = diagram.mode_at(crossing["speed"], crossing["frequency"])
@@ -599,7 +572,7 @@ def _mode_rows(
             "at highest speed / Hz": f"{fast:.1f}",
             "damping / %": f"{100.0 * diagram.damping[known[-1], mode]:.3f}",
             "type": diagram.kinds[mode],
-            "whirl": _whirl_text(whirl),
+            "whirl": "" if abs(whirl) <= WHIRLING else "forward" if whirl > 0.0 else "backward",
             "strongest crossing": "",
             "fraction / %": "",
             "mode shape": material.words.labelled(diagram.names[mode]),
@@ -608,7 +581,7 @@ def _mode_rows(
             low, high = 100.0 * (diagram.over_angle[mode] - 1.0)
             row["over the carrier's angle / %"] = f"{round(low, 2) + 0.0:.2f} to {high:+.2f}"
         if met is not None:
-            line = line_name(tuple(int(n) for n in index[int(met["line"])]), bases)
+            line = str(data["line"][int(met["line"])].item())
             row["strongest crossing"] = f"{material.words.labelled(line)} at {abs(met['speed']) / RPM:.1f} rpm"
             row["fraction / %"] = f"{100.0 * met['share']:.1f}"
         rows.append(row)
@@ -658,9 +631,7 @@ def _passages(context: Context, carriers: Mapping[str, tuple[str, float]]) -> st
 
 
 def _amplitude(line: str, amplitude: float) -> str:
-    if line.startswith("mesh_force "):
-        return f"{amplitude:.3g} N"
-    return f"{1e6 * amplitude:.3g} µm"
+    return f"{amplitude:.3g} N" if line.startswith("mesh_force ") else f"{1e6 * amplitude:.3g} µm"
 
 
 def _carriers(context: Context) -> dict[str, tuple[str, float]]:
@@ -675,9 +646,7 @@ def _place(data: xr.Dataset, line: OrderLine) -> int | None:
     """Return the index of an order among the spectral components of a response."""
     order = data["order"].to_numpy()
     index = int(np.argmin(np.abs(order - line.order)))
-    if abs(order[index] - line.order) < 1e-6 * line.order:
-        return index
-    return None
+    return index if abs(order[index] - line.order) < 1e-6 * line.order else None
 
 
 def _curves(data: xr.Dataset, runs: Sequence[VariantRun], line: OrderLine) -> list[Curve]:
@@ -733,12 +702,6 @@ def _unit_rate(run: VariantRun) -> float:
     return sweep_rate(stored["time"], stored["input_speed"], 1.0)
 
 
-def _whirl_text(whirl: float) -> str:
-    if abs(whirl) <= WHIRLING:
-        return ""
-    return "forward" if whirl > 0.0 else "backward"
-
-
 def _row(material: ReportData, peak: Peak, data: xr.Dataset, rates: dict[str, float]) -> dict[str, object]:
     damping = _damping(peak, data)
     row: dict[str, object] = {
@@ -749,24 +712,21 @@ def _row(material: ReportData, peak: Peak, data: xr.Dataset, rates: dict[str, fl
         "damping / %": "–" if damping is None else f"{100.0 * damping:.3f}",
     }
     for load_case, rate in rates.items():
-        too_fast = damping is not None and sweep_severity(peak.frequency, damping, rate * peak.order) > MAX_SWEEP_RATIO
-        if damping is None:
-            row[f"run-up {load_case}"] = "–"
-        elif too_fast:
-            row[f"run-up {load_case}"] = TOO_FAST
-        else:
-            row[f"run-up {load_case}"] = "slow enough"
+        said = "–"
+        if damping is not None:
+            too_fast = sweep_severity(peak.frequency, damping, rate * peak.order) > MAX_SWEEP_RATIO
+            said = TOO_FAST if too_fast else "slow enough"
+        row[f"run-up {load_case}"] = said
     return row
 
 
 def _damping(peak: Peak, data: xr.Dataset) -> float | None:
     """Return the damping of the mode that the order of a peak crosses there, if known."""
     orders = data["order"].to_numpy()
-    near = []
-    for crossing in json.loads(data.attrs["crossings"]):
-        same = abs(orders[crossing["line"]] - peak.order) < 1e-9 * peak.order
-        if same and abs(crossing["speed"] - peak.speed) < SAME_SPEED * abs(peak.speed):
-            near.append((abs(crossing["speed"] - peak.speed), float(crossing["damping"])))
-    if near:
-        return min(near)[1]
-    return None
+    near = [
+        (abs(crossing["speed"] - peak.speed), float(crossing["damping"]))
+        for crossing in json.loads(data.attrs["crossings"])
+        if abs(orders[crossing["line"]] - peak.order) < 1e-9 * peak.order
+        and abs(crossing["speed"] - peak.speed) < SAME_SPEED * abs(peak.speed)
+    ]
+    return min(near)[1] if near else None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -132,16 +132,6 @@ ALSO = 4
 """Maximum number of further orders listed for a resonance."""
 
 
-@dataclass(frozen=True)
-class Drawn:
-    """Part of a waterfall that is drawn."""
-
-    around: tuple[float, float] | None
-    """Speeds with most columns, rad/s."""
-    response: bool
-    """Whether it is of a steady-state response."""
-
-
 def run_data(material: ReportData) -> dict[str, Any]:
     """Return the script data of all run-ups, steady-state responses and modes: ``lines``, ``groups``, ``models``."""
     modes = material.results.modes
@@ -181,12 +171,16 @@ def _group(material: ReportData, group: RunGroup) -> dict[str, Any]:
 
 def _variant(material: ReportData, group: RunGroup, run: VariantRun) -> dict[str, Any]:
     material.context.tell(f"channels of {run.variant}, {group.source}, {group.inertias}")
-    drawn = Drawn(group.rankings[run.variant].around, run.variant in group.responses)
-    channels = [_overall(material, run.spectra, drawn)]
+    levels = partial(_levels, material, group, run.variant)
+    overall = {"name": "overall", "words": "Overall transmission error", "unit": "µm"}
+    channels = [overall | levels(run.spectra, SPEEDS, STEP, 1, 1)]
     loudest: dict[str, dict[str, Any] | None] = {}
     # One channel at a time, as spectra are large.
     for channel in channels_of(run, material.words, group.responses.get(run.variant)):
-        channels.append(_channel(material, channel, drawn))
+        copies = f", 1 of {channel.copies}" if channel.copies > 1 else ""
+        words = f"{QUANTITY.get(channel.kind, 'Force')}: {channel.words}{copies}"
+        own = {"name": channel.name, "words": words, "unit": channel.spectra.unit}
+        channels.append(own | levels(channel.spectra, CHANNEL_SPEEDS, CHANNEL_STEP, CHANNEL_LINES, CUTS_EVERY))
         if channel.kind == "support":
             loudest[channel.name] = _loudest(material, channel)
     listed = material.lists[group.name, run.variant]
@@ -208,68 +202,46 @@ def is_found_always(own: ListedResonance) -> bool:
     return own.peak is None or own.peak.steady
 
 
-def _highest(material: ReportData, spectra: Waterfall, response: bool) -> int:
-    """Return the number of spectral lines that are drawn: all of a response, which has only these."""
-    if response:
-        return len(spectra.frequency)
-    fundamental = max(material.context.gearbox.train.mesh_frequencies(2.0 * math.pi).values(), default=math.inf)
-    top = TOP * fundamental * float(spectra.speed.max()) / (2.0 * math.pi)
-    return max(4, int(np.searchsorted(spectra.frequency, min(top, float(spectra.frequency[-1])))))
-
-
-def _overall(material: ReportData, spectra: Waterfall, drawn: Drawn) -> dict[str, Any]:
-    count = _highest(material, spectra, drawn.response)
-    knots = knots_of(float(spectra.speed.min()), float(spectra.speed.max()), drawn.around, SPEEDS)
-    level = pooled(spectra.level[:, :count], spectra.speed, knots, 1)
-    return {
-        "name": "overall",
-        "words": "Overall transmission error",
-        "unit": "µm",
-        **_cells(material, level, spectra, _floor(spectra, count), knots, STEP, 1),
-        **_cuts(material, spectra, 1),
-    }
-
-
-def _channel(material: ReportData, channel: Channel, drawn: Drawn) -> dict[str, Any]:
-    spectra = channel.spectra
-    count = _highest(material, spectra, drawn.response)
-    knots = knots_of(float(spectra.speed.min()), float(spectra.speed.max()), drawn.around, CHANNEL_SPEEDS)
-    level = pooled(spectra.level[:, :count], spectra.speed, knots, CHANNEL_LINES)
-    copies = f", 1 of {channel.copies}" if channel.copies > 1 else ""
-    return {
-        "name": channel.name,
-        "words": f"{QUANTITY.get(channel.kind, 'Force')}: {channel.words}{copies}",
-        "unit": spectra.unit,
-        **_cells(material, level, spectra, _floor(spectra, count), knots, CHANNEL_STEP, CHANNEL_LINES),
-        **_cuts(material, spectra, CUTS_EVERY),
-    }
-
-
-def _floor(spectra: Waterfall, count: int) -> float:
-    """Return the lowest level of the scale (dB), a multiple of ten."""
-    return 10.0 * math.floor((float(spectra.level[:, 2:count].max()) - SPAN) / 10.0)
-
-
-def _cells(
-    material: ReportData, level: Floats, spectra: Waterfall, floor: float, knots: Knots, step: float, lines: int
+def _levels(
+    material: ReportData,
+    group: RunGroup,
+    variant: str,
+    spectra: Waterfall,
+    columns: int,
+    step: float,
+    lines: int,
+    every: int,
 ) -> dict[str, Any]:
+    """Return the waterfall of a channel and its order cuts.
+
+    Parameters
+    ----------
+    columns : over the speed
+    step : level difference per byte step, dB
+    lines : spectral lines that are drawn as one
+    every : stride of the frames in the order cuts
+    """
+    count = len(spectra.frequency)
+    if variant not in group.responses:  # a response has only lines that are drawn
+        fundamental = max(material.context.gearbox.train.mesh_frequencies(2.0 * math.pi).values(), default=math.inf)
+        top = TOP * fundamental * float(spectra.speed.max()) / (2.0 * math.pi)
+        count = max(4, int(np.searchsorted(spectra.frequency, min(top, float(spectra.frequency[-1])))))
+    around = group.rankings[variant].around
+    knots = knots_of(float(spectra.speed.min()), float(spectra.speed.max()), around, columns)
+    floor = 10.0 * math.floor((float(spectra.level[:, 2:count].max()) - SPAN) / 10.0)
+    spacing = float(spectra.frequency[1])
+    cells = level_bytes(pooled(spectra.level[:, :count], spectra.speed, knots, lines), floor, step)
+    along = np.array([spectra.along(line) for line in material.lines])
+    cuts = tenths(along.reshape(len(material.lines), spectra.time.size).T)
     return {
-        "cells": material.arrays.add(level_bytes(level, floor, step)),
+        "cells": material.arrays.add(cells),
         "floor": floor,
         "step": step,
-        "spacing": rounded(lines * float(spectra.frequency[1]), 9),
-        "first": rounded(0.5 * (lines - 1) * float(spectra.frequency[1]), 9),
+        "spacing": rounded(lines * spacing, 9),
+        "first": rounded(0.5 * (lines - 1) * spacing, 9),
         "knots": [[speed / RPM for speed in knots[0]], knots[1]],
-    }
-
-
-def _cuts(material: ReportData, spectra: Waterfall, every: int) -> dict[str, Any]:
-    speeds = (spectra.speed[::every] / RPM).astype("f4")
-    levels = np.array([spectra.along(line) for line in material.lines])
-    cuts = tenths(levels.reshape(len(material.lines), spectra.time.size).T)
-    return {
         "cuts": material.arrays.add(cuts[::every].copy(), differences=True),
-        "speeds": material.arrays.add(speeds),
+        "speeds": material.arrays.add((spectra.speed[::every] / RPM).astype("f4")),
     }
 
 
@@ -298,7 +270,6 @@ def axial_of_shaft(gearbox: Gearbox, channel: Channel) -> float:
 
 
 def _loudest(material: ReportData, channel: Channel) -> dict[str, Any] | None:
-    """Return the values of a bearing for its table."""
     order = dominant_order(channel.spectra, material.lines)
     return {
         "words": channel.words,

@@ -20,12 +20,7 @@ if TYPE_CHECKING:
 
 
 def loudest(found: Mapping[str, Any], material: ReportData) -> str:
-    """Return the loudest speed and its loudest order in one sentence, as the terminal has them.
-
-    Parameters
-    ----------
-    found : summary of a `SoundOverSpeed` with orders
-    """
+    """Return loudest speed and order of a summary of `SoundOverSpeed` in one sentence, as the terminal has them."""
     first = found["orders"][0]
     at = f"{rounded_text(found['speed_rpm'])} rpm"
     order = f"{rounded_text(first['frequency_Hz'])} Hz, {material.words.labelled(first['line'])}"

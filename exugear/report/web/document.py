@@ -35,7 +35,6 @@ class Library:
     name: str
     version: str
     licence: str
-    """Name of its licence."""
     files: tuple[tuple[str, str], ...]
     """Files with the SHA-256 of each."""
     licence_file: str
@@ -205,9 +204,7 @@ def rounded(value: float, digits: int = 5) -> float | None:
     >>> rounded(3.14159265, 3), rounded(float("nan"))
     (3.14, None)
     """
-    if np.isfinite(value):
-        return float(f"{value:.{digits}g}")
-    return None
+    return float(f"{value:.{digits}g}") if np.isfinite(value) else None
 
 
 def rounded_list(values: NDArray[Any], digits: int = 5) -> list[float | None]:
@@ -225,6 +222,10 @@ THEME = (
     "catch(e){document.documentElement.dataset.theme='light'}document.documentElement.classList.add('scripted')"
 )
 """Script that runs before the first paint: it sets the colours selected last, or those of the system."""
+
+
+NO_RESULTS: Mapping[str, Any] = {"input": "", "rated": None, "lines": [], "groups": [], "charts": {}}
+"""Data of a page without results over speed."""
 
 
 def whole_page(

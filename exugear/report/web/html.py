@@ -37,7 +37,6 @@ class Cell:
     """Table cell with more properties than its text."""
 
     shown: str
-    """Its text."""
     value: float | None = None
     """Number in the unit of the heading, for sorting and for CSV files; NaN where there is none. By default the text
     is used."""
@@ -112,9 +111,7 @@ class Table:
 
 
 def _cell(value: object) -> Cell:
-    if isinstance(value, Cell):
-        return value
-    return Cell(str(value))
+    return value if isinstance(value, Cell) else Cell(str(value))
 
 
 @dataclass(frozen=True)

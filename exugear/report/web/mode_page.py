@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from exugear.report.web.document import ArrayStore, rounded, whole_page
+from exugear.report.web.document import NO_RESULTS, ArrayStore, rounded, whole_page
 from exugear.report.web.html import Cell, Table, render
 from exugear.report.web.stage import stage_data
 from exugear.system.system import Assembly
@@ -32,7 +32,6 @@ class ModeRow:
     damping: float
     """Hz, and ratio to critical damping."""
     moves: str
-    """Mode shape as text."""
     strain: str = ""
     """Parts with most strain energy."""
     resonances: str = ""
@@ -146,11 +145,7 @@ def write_mode_page(
         deformed = []
     data: dict[str, Any] = {
         "name": heading,
-        "input": "",
-        "rated": None,
-        "lines": [],
-        "groups": [],
-        "charts": {},
+        **NO_RESULTS,
         "first": first,
         "models": {
             MODEL: {

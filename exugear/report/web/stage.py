@@ -59,7 +59,10 @@ def rigid_bodies(gearbox: Gearbox) -> tuple[DrawnBody, ...]:
     """List all bodies of a gearbox that have a shape to draw, as rigid ones."""
     shapes = bodies_of(gearbox)
     colours = body_colours(shapes)
-    return tuple(DrawnBody(shape, _written(colours[shape.family]), shape.name) for shape in shapes)
+    return tuple(
+        DrawnBody(shape, "#" + "".join(f"{round(255 * channel):02x}" for channel in colours[shape.family]), shape.name)
+        for shape in shapes
+    )
 
 
 def _elastic(assembly: Assembly, colours: dict[str, str]) -> list[DrawnBody]:
@@ -84,10 +87,6 @@ def _elastic(assembly: Assembly, colours: dict[str, str]) -> list[DrawnBody]:
             place = np.array([*body.axis, z])
             drawn.append(DrawnBody(BodyShape(seat, seat, disc, place), colour, body.name))
     return drawn
-
-
-def _written(colour: tuple[float, float, float]) -> str:
-    return "#" + "".join(f"{round(255 * channel):02x}" for channel in colour)
 
 
 @dataclass(frozen=True)
@@ -163,9 +162,7 @@ def turn_between(first: BodyShape, other: BodyShape) -> float | None:
     cosine = math.cos(angle)
     sine = math.sin(angle)
     turned = one @ np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-    if float(np.abs(turned - two).max()) < SAME_SHAPE:
-        return angle
-    return None
+    return angle if float(np.abs(turned - two).max()) < SAME_SHAPE else None
 
 
 # Bodies and mode shapes as data for the animated 3-D view

@@ -98,13 +98,9 @@ class GearboxOrder:
 
 
 def gearbox_orders(gearbox: Gearbox, highest: float) -> tuple[GearboxOrder, ...]:
-    """Orders of all shafts with four multiples, and of all meshes with harmonics and sidebands.
+    """Orders, up to the highest, of all shafts with four multiples, and of all meshes with harmonics and sidebands.
 
     Sidebands are two by each body of the mesh, and of planets one more than their number by the carrier.
-
-    Parameters
-    ----------
-    highest : highest order
 
     Examples
     --------
@@ -174,19 +170,15 @@ def standing_orders(spectrum: OrderSpectrum) -> tuple[OrderInSpectrum, ...]:
     [7.41]
     """
     level = spectrum.prominence
-    peaks = np.flatnonzero((level[2:-2] > ABOVE) & _is_highest(spectrum.amplitude)) + 2
+    # the highest of itself and two neighbours on each side
+    around = np.lib.stride_tricks.sliding_window_view(spectrum.amplitude, 5)
+    peaks = np.flatnonzero((level[2:-2] > ABOVE) & np.asarray(around.argmax(axis=1) == 2)) + 2
     orders = [
         OrderInSpectrum(float(spectrum.order[line]), float(spectrum.amplitude[line]), float(level[line]))
         for line in peaks
         if line > MAIN_LOBE
     ]
     return tuple(sorted(orders, key=lambda order: -order.amplitude))
-
-
-def _is_highest(values: Floats) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Return where a value is the highest of itself and two neighbours on each side, without the two outermost."""
-    around = np.lib.stride_tricks.sliding_window_view(values, 5)
-    return np.asarray(around.argmax(axis=1) == 2)
 
 
 def foreign_orders(
@@ -262,6 +254,4 @@ def likely_speed(spectrum: OrderSpectrum, orders: Sequence[float], candidates: M
         return None
     best = max(known, key=lambda mistake: known[mistake])
     assumed = speed_score(spectrum, orders, 1.0)
-    if known[best] > ABOVE and not known[best] < assumed + CLEARLY:
-        return best
-    return None
+    return best if known[best] > ABOVE and not known[best] < assumed + CLEARLY else None

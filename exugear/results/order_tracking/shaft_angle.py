@@ -79,15 +79,10 @@ class ShaftAngle(ReprMixin):
 
 
 def pulse_times(values: Floats, rate: float) -> Floats:
-    """Find the times of the rising edges of a tacho signal, s, linear between samples.
+    """Find the times (s) of rising edges of a tacho signal (n,), linear between samples; the rate is in Hz.
 
     The trigger level is halfway between low and high. Pulses may cover any part of a revolution, as long as every
     fiftieth part of the signal has one.
-
-    Parameters
-    ----------
-    values : (n,) tacho signal in any unit
-    rate : sampling rate, Hz
 
     Raises
     ------
@@ -239,17 +234,13 @@ def _smooth_spline(time: Floats, angle: Floats) -> BSpline:
     for intervals in KNOTS:
         if intervals > time.size // 6:
             break
-        errors[intervals] = _prediction_error(time, angle, intervals)
+        # Root mean square error of left-out pulses, rad
+        predicted = _least_squares(time[::2], angle[::2], intervals)(time[1::2])
+        inside = slice(0, -1) if time.size % 2 == 0 else slice(None)  # a last pulse would be extrapolated
+        errors[intervals] = float(np.sqrt(np.mean((predicted - angle[1::2])[inside] ** 2)))
     least = min(errors.values(), default=np.inf)
     chosen = next((intervals for intervals, error in errors.items() if error <= AS_GOOD * least), 2)
     return _least_squares(time, angle, chosen)
-
-
-def _prediction_error(time: Floats, angle: Floats, intervals: int) -> float:
-    """Root mean square error of left-out pulses, rad."""
-    predicted = _least_squares(time[::2], angle[::2], intervals)(time[1::2])
-    inside = slice(0, -1) if time.size % 2 == 0 else slice(None)  # a last pulse would be extrapolated
-    return float(np.sqrt(np.mean((predicted - angle[1::2])[inside] ** 2)))
 
 
 def _least_squares(time: Floats, angle: Floats, intervals: int) -> BSpline:
@@ -287,16 +278,11 @@ def _values_and_slopes(spline: BSpline, at: Floats) -> tuple[Floats, Floats]:
 
 
 def angle_of_speed(speed: Floats, rate: float) -> ShaftAngle:
-    """Angle of a shaft from a speed signal, by integration.
+    """Angle of a shaft from a speed signal (n,), rad/s in either sense, by integration; the rate is in Hz.
 
     An error e of the speed shifts the phase of order n by 2 pi n R e within R revolutions: for levels within 0.2 dB
     under a Hann window, n R e must be below 0.18. A signal that is 0.1 % wrong is good for orders up to 22 with eight
     revolutions.
-
-    Parameters
-    ----------
-    speed : (n,) rad/s, in either sense
-    rate : sampling rate, Hz
 
     Returns
     -------

@@ -80,15 +80,11 @@ def nominal_frequency(number: Integers) -> Floats:
 
 
 def third_octave_powers(power: Floats, frequency: Floats) -> tuple[Integers, Floats]:
-    """Add the powers of lines by third octaves.
+    """Add the powers of lines by third octaves; return their numbers (bands,) and powers (points, bands), W.
 
     Parameters
     ----------
     power, frequency : (points, lines) W and Hz; powers that are not a number do not count
-
-    Returns
-    -------
-    (bands,) consecutive numbers of third octaves, and (points, bands) powers in W
 
     Examples
     --------

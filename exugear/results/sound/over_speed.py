@@ -160,12 +160,7 @@ def _levels(levels: Floats) -> dict[str, float]:
 
 
 def sound_over_speed(data: xr.Dataset) -> SoundOverSpeed | None:
-    """Return the sound power of a stored response; None without a flexible housing.
-
-    Parameters
-    ----------
-    data : as `exugear.steady.steady_file.load_response` reads it
-    """
+    """Return the sound power of a response from `load_response`; None without a flexible housing."""
     if "sound_power" not in data:
         return None
     return SoundOverSpeed(

@@ -33,10 +33,8 @@ def surface_velocities(
 
     Parameters
     ----------
-    surfaces : by the name of the body
     motion : (lines, n) peak amplitudes of the coordinates of each of them, m and rad
     frequency : (lines,) Hz
-    names : of the orders
     speed : of the overall input, rad/s
 
     Returns

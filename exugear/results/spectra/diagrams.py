@@ -1,7 +1,4 @@
-"""Diagrams of run-ups: waterfalls with order lines, and levels along the orders.
-
-Functions take spectra of `exugear.results.spectra.waterfall`; they need no display.
-"""
+"""Diagrams of run-ups: waterfalls with order lines, and levels along the orders."""
 
 from __future__ import annotations
 
@@ -56,8 +53,6 @@ def plot_waterfalls(
     Parameters
     ----------
     runs : title and spectra of each panel
-    lines : order lines to draw and label
-    path : file for the picture
     marks : peaks to circle and number in a panel, such as those that only this run shows
     highest_frequency : end of the frequency axis, Hz
     dynamic_range : span of the colours below the highest level of all runs, dB
@@ -86,7 +81,13 @@ def plot_waterfalls(
         for panel, (name, run) in zip(panels, runs.items(), strict=True):
             image = _draw_waterfall(panel, run, order_lines, (fastest, top), (highest - dynamic_range, highest))
             panel.set_title(name, loc="left", pad=24.0)
-            _draw_marks(panel, (marks or {}).get(name, ()))
+            for number, pick in enumerate((marks or {}).get(name, ()), start=1):
+                speed = pick.speed / RPM
+                frequency = 1e-3 * pick.frequency
+                panel.plot(speed, frequency, "o", markersize=9, markerfacecolor="none", markeredgecolor=MARK_COLOUR)
+                panel.annotate(
+                    str(number), (speed, frequency), (6, 6), textcoords="offset points", fontsize=8, color=MARK_COLOUR
+                )
         panels[0].set_ylabel("Frequency / kHz")
         label = _level_label(quantity, next(iter(runs.values())))
         figure.colorbar(image, ax=panels, label=label, extend="min", aspect=30)
@@ -172,7 +173,6 @@ def pooled_levels(
 
     Parameters
     ----------
-    run : spectra
     highest_frequency, fastest : upper ends of the axes, Hz and rad/s; the axes begin at zero
     shape : maximum number of cells along frequency and speed
 
@@ -215,13 +215,3 @@ def _draw_order_lines(panel: Axes, lines: Sequence[OrderLine], fastest: float, t
             )
             label.set(fontsize=7.0, annotation_clip=False, va="bottom" if above else "center")
             label.set_rotation(35.0 if above else 0.0)
-
-
-def _draw_marks(panel: Axes, picks: Sequence[Pick]) -> None:
-    for number, pick in enumerate(picks, start=1):
-        speed = pick.speed / RPM
-        frequency = 1e-3 * pick.frequency
-        panel.plot(speed, frequency, "o", markersize=9, markerfacecolor="none", markeredgecolor=MARK_COLOUR)
-        panel.annotate(
-            str(number), (speed, frequency), (6, 6), textcoords="offset points", fontsize=8, color=MARK_COLOUR
-        )

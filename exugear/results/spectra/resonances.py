@@ -49,8 +49,6 @@ def pick_resonances(
 
     Parameters
     ----------
-    spectra : spectra of the run
-    lines : order lines to search
     prominence : minimum height of a peak above the higher of its two adjacent valleys, dB
     depth
         Peaks that are lower than the highest level of all order lines by more than this, dB, are omitted: without
@@ -148,10 +146,6 @@ class WaterfallResonance(ReprMixin, line=" {_frequency_text}, {_highest_text}, {
 def group_by_frequency(picks: Iterable[Pick]) -> tuple[WaterfallResonance, ...]:
     """Group the peaks of several orders that belong to one resonance.
 
-    Parameters
-    ----------
-    picks : peaks of any lines
-
     Returns
     -------
     by frequency. Starting with the highest, each peak is grouped with those within the larger of both resolutions.
@@ -181,12 +175,7 @@ def _are_indistinct(first: Pick, second: Pick) -> bool:
 def match_eigenfrequencies(
     resonances: Sequence[Pick | WaterfallResonance], eigenfrequencies: ArrayLike
 ) -> tuple[int | None, ...]:
-    """Assign an eigenfrequency to each resonance.
-
-    Parameters
-    ----------
-    resonances : peaks or resonances of a waterfall
-    eigenfrequencies : (n,) Hz
+    """Assign an eigenfrequency, of (n,) in Hz, to each peak or resonance of a waterfall.
 
     Returns
     -------
@@ -215,7 +204,6 @@ class OrderCut(ReprMixin):
     """Amplitude and phase along an order."""
 
     line: OrderLine
-    """The order."""
     time: Floats
     speed: Floats
     frequency: Floats
@@ -240,6 +228,10 @@ class OrderCut(ReprMixin):
         }
 
 
+OVERLAP = 0.75
+"""Overlap of the windows of an order cut, as a fraction."""
+
+
 def order_cut(
     values: ArrayLike,
     speed: ArrayLike,
@@ -247,22 +239,17 @@ def order_cut(
     line: OrderLine,
     *,
     window_length: float,
-    overlap: float = 0.75,
-    window: str = "hann",
 ) -> OrderCut:
     """Follow an order along the instantaneous speed.
 
-    The signal is multiplied by ``exp(-i order angle)``, the angle being the integral of the speed, and averaged under a
-    window. This demodulates the order to zero frequency, so that its amplitude is exact at any sweep rate.
+    The signal is multiplied by ``exp(-i order angle)``, the angle being the integral of the speed, and averaged under
+    Hann windows. This demodulates the order to zero frequency, so that its amplitude is exact at any sweep rate.
 
     Parameters
     ----------
     values, speed : (n,) signal and speed of the reference shaft (rad/s), uniformly sampled
     rate : sampling rate, Hz
-    line : the order to follow
     window_length : s; other orders closer than about ``2 / window_length`` in Hz cause leakage
-    overlap : overlap of adjacent windows, in [0, 1)
-    window : name of a SciPy window
 
     Examples
     --------
@@ -281,17 +268,17 @@ def order_cut(
     step = 0.5 * (np.abs(shaft[1:]) + np.abs(shaft[:-1])) / rate
     angle = np.concatenate([[0.0], np.cumsum(step)])
     turning_back = np.exp(-1j * line.order * angle)
-    weights = scipy.signal.get_window(window, length)
+    weights = scipy.signal.get_window("hann", length)
     weights *= 2.0 / weights.sum()
     demodulated = signal * turning_back
-    mean_speed = np.abs(overlapping_frames(shaft, length, overlap).mean(axis=1))
+    mean_speed = np.abs(overlapping_frames(shaft, length, OVERLAP).mean(axis=1))
     return OrderCut(
         line=line,
-        time=overlapping_frames(np.arange(signal.size) / rate, length, overlap).mean(axis=1),
+        time=overlapping_frames(np.arange(signal.size) / rate, length, OVERLAP).mean(axis=1),
         speed=mean_speed,
         frequency=line.frequency(mean_speed),
-        amplitude=overlapping_frames(demodulated.real, length, overlap) @ weights
-        + 1j * (overlapping_frames(demodulated.imag, length, overlap) @ weights),
+        amplitude=overlapping_frames(demodulated.real, length, OVERLAP) @ weights
+        + 1j * (overlapping_frames(demodulated.imag, length, OVERLAP) @ weights),
     )
 
 
@@ -306,13 +293,7 @@ FEWEST_SAMPLES = 16
 
 
 def sweep_severity(frequency: float, damping: float, rate: float) -> float:
-    """Sweep-rate ratio, which compares the sweep rate with the build-up of a resonance: f' / (2 pi zeta^2 f^2).
-
-    Parameters
-    ----------
-    frequency : frequency of the resonance, Hz
-    damping : damping ratio
-    rate : sweep rate, Hz/s
+    """Sweep-rate ratio, of a sweep rate (Hz/s) to the build-up of a resonance at f (Hz): f' / (2 pi zeta^2 f^2).
 
     Examples
     --------

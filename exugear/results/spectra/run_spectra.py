@@ -54,7 +54,6 @@ class ModeReport(ReprMixin):
     damping_ratio: float
     """Frequency (Hz) and damping ratio."""
     name: str
-    """Description of the mode shape."""
     share: float
     """Participation in the overall transmission error, see `mobility_shares`."""
     amplification: float
@@ -70,9 +69,9 @@ class ModeReport(ReprMixin):
         share = f"share {100 * self.share:.2g} %"
         return f" {self.index}: {self.frequency:.1f} Hz, {share}, {shorten(self.name, 90)}"
 
-    def is_near(self, frequency: float, tolerance: float = NEAR) -> bool:
-        """Return whether the relative distance of the mode from a frequency (Hz) is within a tolerance."""
-        return abs(self.frequency - frequency) <= tolerance * frequency
+    def is_near(self, frequency: float) -> bool:
+        """Return whether the relative distance of the mode from a frequency (Hz) is at most `NEAR`."""
+        return abs(self.frequency - frequency) <= NEAR * frequency
 
 
 def report_mode(modes: xr.Dataset, index: int) -> ModeReport:
@@ -131,7 +130,6 @@ class RunSignals(ReprMixin, line=": {overall.size} samples at {rate:.6g} Hz"):
 
     path: Path
     attributes: Mapping[str, Any]
-    """Attributes of the run."""
     rate: float
     """Sampling rate, Hz."""
     span: float
@@ -225,7 +223,6 @@ class VariantRun(ReprMixin):
 
     path: Path
     attributes: Mapping[str, Any]
-    """Attributes of the run."""
     spectra: Waterfall
     picks: tuple[Pick, ...]
     modes: xr.Dataset | None
@@ -250,9 +247,9 @@ class VariantRun(ReprMixin):
         load_case, law, inertias = (self.attributes[key] for key in ("load_case", "mesh_model", "inertias"))
         return f"load case {load_case}, mesh model {law}, inertia set {inertias}"
 
-    def findings(self, picks: Sequence[Pick] | None = None) -> tuple[Finding, ...]:
-        """Resonances, by frequency, of all peaks or of some of them, each with its mode."""
-        resonances = group_by_frequency(self.picks if picks is None else picks)
+    def findings(self) -> tuple[Finding, ...]:
+        """Resonances of all peaks, by frequency, each with its mode."""
+        resonances = group_by_frequency(self.picks)
         if self.modes is None:
             return tuple(Finding(resonance, None, math.nan, "") for resonance in resonances)
         visible = self._seen_modes(self.modes)
@@ -279,28 +276,6 @@ class VariantRun(ReprMixin):
         if mode is None or self.modes is None:
             return Finding(resonance, None, math.nan, "")
         return Finding(resonance, mode, float(self.modes["frequency"][mode]), str(self.modes["name"].to_numpy()[mode]))
-
-
-def read_run(
-    path: str | Path, lines: Sequence[OrderLine], modes: xr.Dataset | None = None, window_length: float | None = None
-) -> VariantRun:
-    """Read a run-up, compute its waterfall and pick its resonances.
-
-    Parameters
-    ----------
-    path : ``run.nc``, or ``run.partial`` of a run that was stopped
-    lines : order lines to search for resonances
-    modes : modes of the same variant, mesh model and inertia set
-    window_length : s; runs to be compared need the same length
-
-    Raises
-    ------
-    ValueError
-        The run is too short for a spectrum, or its speed does not change.
-    FileError
-        The run is missing or damaged.
-    """
-    return analysed(run_signals(path), lines, modes, window_length)
 
 
 def analysed(
@@ -336,13 +311,7 @@ class AbsenceRule:
 
 
 def only_in_first(picks: Iterable[Pick], other: Waterfall, rule: AbsenceRule | None = None) -> tuple[Pick, ...]:
-    """Select the peaks of one run that are absent from another run.
-
-    Parameters
-    ----------
-    picks : peaks of the first run
-    other : spectra of the second run, in the same unit
-    rule : thresholds; default: those of `AbsenceRule`
+    """Select the peaks of one run that are absent from another run, by the thresholds of a rule.
 
     Returns
     -------
@@ -458,20 +427,8 @@ class OtherWindow:
     """Peaks of a variant that are absent from the other variant, by (variant, other variant)."""
 
 
-def other_windows(
-    runs: Sequence[VariantRun],
-    lines: Sequence[OrderLine],
-    factors: Iterable[float] = WINDOW_FACTORS,
-    rule: AbsenceRule | None = None,
-) -> tuple[OtherWindow, ...]:
-    """Find the resonances of runs with other window lengths; the memory holds one length at a time.
-
-    Parameters
-    ----------
-    runs : of different variants, analysed with one window length
-    lines : order lines to search
-    factors : factors on this window length
-    rule : rule by which a peak counts as absent
+def other_windows(runs: Sequence[VariantRun], lines: Sequence[OrderLine]) -> tuple[OtherWindow, ...]:
+    """Find the resonances of runs of different variants with other windows; the memory holds one length at a time.
 
     Raises
     ------
@@ -480,12 +437,12 @@ def other_windows(
     """
     signals = {run.variant: run_signals(run.path) for run in runs}
     windows = []
-    for factor in factors:
+    for factor in WINDOW_FACTORS:
         length = factor * runs[0].spectra.window_length
         spectra = {variant: signal.waterfall(length) for variant, signal in signals.items()}
         picks = {variant: pick_resonances(spectrum, lines) for variant, spectrum in spectra.items()}
         absent = {
-            (variant, other): only_in_first(picks[variant], spectra[other], rule)
+            (variant, other): only_in_first(picks[variant], spectra[other])
             for variant, other in itertools.permutations(spectra, 2)
         }
         windows.append(OtherWindow(picks, absent))

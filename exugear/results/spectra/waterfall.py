@@ -48,11 +48,7 @@ class OrderLine:
 
 
 def order_lines(gearbox: Gearbox, count: int = 3) -> tuple[OrderLine, ...]:
-    """Order lines of all meshes with harmonics; meshes of equal frequency (sun and ring) share a line.
-
-    Parameters
-    ----------
-    count : harmonics of each mesh, including the first
+    """Order lines of all meshes with `count` harmonics; meshes of equal frequency (sun and ring) share a line.
 
     Examples
     --------
@@ -235,7 +231,6 @@ def waterfall(
     overlap : overlap of adjacent windows, in [0, 1)
     window : name of a SciPy window
     reference : amplitude of 0 dB, in `unit`
-    unit : unit of the signal
 
     Returns
     -------
@@ -287,11 +282,6 @@ def overlapping_frames(values: Floats, length: int, overlap: float) -> Floats:
 
 def line_level(spectra: Waterfall, line: OrderLine) -> Floats:
     """Level along an order line.
-
-    Parameters
-    ----------
-    spectra : spectra of the run
-    line : the order line
 
     Returns
     -------

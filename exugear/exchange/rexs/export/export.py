@@ -17,7 +17,7 @@ from exugear.exchange.rexs.mapping import ATTRIBUTES, OWN, RESULTS, Version
 from exugear.exchange.rexs.to_case.conversion import to_case
 from exugear.exchange.rexs.to_case.notes import Rules
 from exugear.exchange.rexs.tree import Addition, AdditionValue, Model, RexsError
-from exugear.gearbox.choice import Choice
+from exugear.gearbox.choice import Choice, choice_of
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Body, seat_key
 from exugear.gearbox.reading import GearboxFileError
@@ -104,16 +104,16 @@ class ResultsForExport:
 
     def _modes(self, path: Path) -> tuple[Choice, xr.Dataset]:
         data = load_modes(path)
-        self._check(_choice(data.attrs), data.attrs)
-        return _choice(data.attrs), data
+        self._check(choice_of(data.attrs), data.attrs)
+        return choice_of(data.attrs), data
 
     def _run(self, path: Path) -> tuple[Choice, xr.Dataset]:
         data = load_run(path, ("mesh_force",))
         case = str(data.attrs["load_case"])
         if case not in self.gearbox.load_cases:
             raise GearboxFileError(f"the gearbox file has no load case {case!r}")
-        self._check(_choice(data.attrs), data.attrs, case)
-        return replace(_choice(data.attrs), load_case=case), data
+        self._check(choice_of(data.attrs), data.attrs, case)
+        return replace(choice_of(data.attrs), load_case=case), data
 
     def _duties(self, path: Path) -> tuple[Choice, list[Mapping[str, Any]]]:
         content = read_duties(path)
@@ -138,10 +138,6 @@ class ResultsForExport:
             self._assemblies[choice] = assemble(self.gearbox, choice, stiffness, bodies)
         if input_hash(self._assemblies[choice], load_case) != attributes.get("input_hash"):
             raise GearboxFileError("was computed from another input; recompute it")
-
-
-def _choice(attributes: Mapping[str, Any]) -> Choice:
-    return Choice(*(str(attributes[key]) for key in ("variant", "mesh_model", "inertias")))
 
 
 # Results on gears and stages: geometry, static load and transmission error tables
@@ -170,12 +166,7 @@ class Results(ReprMixin, line=": {additions!n} attributes"):
     def put(
         self, component: int, key: str, value: ArrayLike | None, load_case: int | None = None, own: bool = False
     ) -> None:
-        """Add a result in SI (key of `RESULTS`) under its name in the version, or a custom one; None is skipped.
-
-        Parameters
-        ----------
-        own : whether the name is a custom one although REXS has one
-        """
+        """Add a result in SI (key of `RESULTS`) under its name in the version, or its `own` name; None is skipped."""
         if value is None:
             return
         unit = RESULTS[key].unit
@@ -193,9 +184,7 @@ class Results(ReprMixin, line=": {additions!n} attributes"):
     def sense(self, component: int) -> int:
         """Sense of a component's u axis: 1 along +z, -1 against it."""
         axes = self.origins.axes.get(component)
-        if axes is None or axes[0, 2] > 0.0:
-            return 1
-        return -1
+        return 1 if axes is None or axes[0, 2] > 0.0 else -1
 
     def gear_data(self, stage: int, gear: Gear) -> int | None:
         """Component with the data of a gear in a stage."""
@@ -509,9 +498,7 @@ def with_results(gearbox: Gearbox, folder: Path, path: str | Path, rules: Rules 
     Parameters
     ----------
     gearbox : imported from the file; its values may have been edited, its names must be unchanged
-    folder : results folder
     path : the REXS file, which is not changed
-    rules : rules of the import
 
     Raises
     ------
@@ -555,7 +542,6 @@ def _static_load_case(gearbox: Gearbox, model: Model) -> int | None:
 
 
 def _replaced(results: Results) -> tuple[str, ...]:
-    """Results in the file that are replaced."""
     entries = []
     for addition in results.additions:
         part = results.model.components[addition.component]

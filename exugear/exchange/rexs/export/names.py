@@ -82,7 +82,7 @@ def origins_of(found: Found) -> Origins:
     """Collect the components from which gears, pairs and bearings originate."""
     model = found.model
     places = found.places
-    first = first_of_planets(model, places, found.bodies)
+    first = first_of_planets(places, found.bodies)
     gears = {
         name: (number, *(other for other, planet in first.items() if planet == number))
         for number, name in found.teeth.names.items()

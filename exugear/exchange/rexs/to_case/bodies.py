@@ -91,9 +91,7 @@ class _Union:
 def torsional_stiffness(connection: Component) -> float | None:
     """Torsional stiffness of a coupling or fit, N m/rad; None if the file has no value."""
     value = connection.quantity(TORSION.attribute)
-    if value is None:
-        return None
-    return TORSION.factor * value
+    return None if value is None else TORSION.factor * value
 
 
 def is_rigid_in_torsion(connection: Component) -> bool:

@@ -249,7 +249,6 @@ class Imported(ReprMixin, line=" {gearbox!r}: {changed!n} assumptions, {ignored!
     text: str
     """Text of the gearbox file with its comments."""
     gearbox: Gearbox
-    """Gearbox of this file."""
     changed: tuple[str, ...]
     """Values that were replaced, and important assumptions."""
     ignored: tuple[str, ...]
@@ -267,13 +266,7 @@ class Imported(ReprMixin, line=" {gearbox!r}: {changed!n} assumptions, {ignored!
 
 
 def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules: Rules | None = None) -> Imported:
-    """Convert a REXS model to a gearbox file and check it.
-
-    Parameters
-    ----------
-    source : name of the REXS file, for the comments
-    path : intended path of the gearbox file, for messages
-    rules : rules for contradictory values
+    """Convert a REXS model to a gearbox file and check it; comments name the `source`, messages the `path`.
 
     Raises
     ------
@@ -285,7 +278,15 @@ def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules:
     splines = {part.number for part in model.components_of_type(*JOINING)}
     relations = (one for one in model.relations if one.type != "stage" or one.roles.get("stage") not in splines)
     model = dataclasses.replace(model, relations=tuple(relations))
-    _refuse_types(model, notes)
+    for begin, words in OTHER_GEARS.items():
+        parts = [part for part in model.components.values() if part.type.startswith(f"{begin}_")]
+        parts = [part for part in parts if part.type.endswith(("_gear", "_wheel", "_stage"))]
+        if parts:
+            names = ", ".join(str(part) for part in parts)
+            notes.errors.append(f"{names}: {words} cannot be imported, only cylindrical gears on parallel axes")
+    notes.errors.tell()
+    if not any(True for _ in model.relations_of("stage")) or not model.components_of_type(*GEARS):
+        notes.errors.append("the file has no stage of two cylindrical gears; nothing to import")
     _refuse_misplaced(model, notes)
     notes.errors.tell()
     places = ComponentPositions(model)
@@ -308,19 +309,6 @@ def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules:
     changed, lost, checked = (tuple(dict.fromkeys(lines)) for lines in (notes.changed, notes.lost, notes.checked))
     ignored = (*lost, *notes.ignored)
     return Imported(text, gearbox, changed, ignored, lost, checked, draft.found, life.spectrum)
-
-
-def _refuse_types(model: Model, notes: Notes) -> None:
-    """Raise an error for a file that is not a gearbox of cylindrical gears."""
-    for begin, words in OTHER_GEARS.items():
-        parts = [part for part in model.components.values() if part.type.startswith(f"{begin}_")]
-        parts = [part for part in parts if part.type.endswith(("_gear", "_wheel", "_stage"))]
-        if parts:
-            names = ", ".join(str(part) for part in parts)
-            notes.errors.append(f"{names}: {words} cannot be imported, only cylindrical gears on parallel axes")
-    notes.errors.tell()
-    if not any(True for _ in model.relations_of("stage")) or not model.components_of_type(*GEARS):
-        notes.errors.append("the file has no stage of two cylindrical gears; nothing to import")
 
 
 def _refuse_misplaced(model: Model, notes: Notes) -> None:

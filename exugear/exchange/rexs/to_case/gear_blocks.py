@@ -59,11 +59,14 @@ def teeth_of(model: Model, places: ComponentPositions, bodies: RigidGroups, note
     RexsError
         Stages cannot be converted to gear pairs; all reasons are reported.
     """
-    first = first_of_planets(model, places, bodies)
+    first = first_of_planets(places, bodies)
     met: dict[frozenset[int], tuple[Component, list[Component]]] = {}
     for relation in model.relations_of("stage"):
         with notes.errors.gathered():
-            part, both = _stage(model, relation.roles)
+            missing = [role for role in ("stage", "gear_1", "gear_2") if role not in relation.roles]
+            if missing:
+                raise RexsError(f"a relation 'stage' has no {' and no '.join(missing)}")
+            part, *both = (model.components[relation.roles[role]] for role in ("stage", "gear_1", "gear_2"))
             pair = frozenset(first.get(gear.number, gear.number) for gear in both)
             if len(pair) == 1:
                 raise RexsError(f"{part}: planets of one set mesh with each other; correct the stage")
@@ -101,7 +104,7 @@ def teeth_of(model: Model, places: ComponentPositions, bodies: RigidGroups, note
     )
 
 
-def first_of_planets(model: Model, places: ComponentPositions, bodies: RigidGroups) -> dict[int, int]:
+def first_of_planets(places: ComponentPositions, bodies: RigidGroups) -> dict[int, int]:
     """Map the gear of each planet to the equal gear of the first planet, by their numbers."""
 
     def ordered(parts: Iterable[Component]) -> list[int]:
@@ -115,13 +118,6 @@ def first_of_planets(model: Model, places: ComponentPositions, bodies: RigidGrou
         for planet in body.others
         for own, number in zip(ordered(body.parts), ordered(planet), strict=True)
     }
-
-
-def _stage(model: Model, roles: Mapping[str, int]) -> tuple[Component, list[Component]]:
-    missing = [role for role in ("stage", "gear_1", "gear_2") if role not in roles]
-    if missing:
-        raise RexsError(f"a relation 'stage' has no {' and no '.join(missing)}")
-    return model.components[roles["stage"]], [model.components[roles[role]] for role in ("gear_1", "gear_2")]
 
 
 def _check_direction(places: ComponentPositions, stage: Component, gears: Sequence[Component], notes: Notes) -> None:

@@ -81,7 +81,6 @@ class ImportedLoads:
     """Torques (N m) and speeds (rpm) on bodies, positive about +z."""
 
     name: str
-    """Name of the load case."""
     description: str
     torques: Mapping[str, float]
     speeds: Mapping[str, float]
@@ -177,17 +176,11 @@ def _shaft(model: Model, load: Component) -> Component | None:
 def _free_body(bodies: RigidGroups, shaft: Component | None) -> RigidGroup | None:
     """Body of a shaft unless it is fixed or a planet."""
     body = bodies.body_of(shaft) if shaft else None
-    if body is None or body.fixed or body.carrier:
-        return None
-    return body
+    return None if body is None or body.fixed or body.carrier else body
 
 
 def ends_of(model: Model, bodies: RigidGroups, loads: Sequence[ImportedLoads], links: Mapping[str, int]) -> Ends:
-    """Determine input and output of the gearbox.
-
-    Parameters
-    ----------
-    links : by body name, number of meshes of each rotating body
+    """Determine input and output of the gearbox; `links` are the numbers of meshes of the rotating bodies.
 
     Raises
     ------

@@ -152,7 +152,21 @@ def with_shifts(gears: Mapping[int, Toothing], stages: Sequence[Stage], notes: N
             break
     for stage in stages:
         with notes.errors.gathered():
-            _check_shifts(solved, stage, notes)
+            stated, total = _shift_sums(solved, stage)
+            notes.checked.append(
+                f"{stage.part}: sum of profile shifts {stated:.6f}, the centre distance requires {total:.6f}"
+            )
+            if abs(stated - total) > SHIFT_TOLERANCE:
+                option = ""
+                if notes.rules.shifts == "file":
+                    option = (
+                        ", or import with --shifts centre-distance, which replaces a shift of 0, or else one of the two"
+                    )
+                raise RexsError(
+                    f"{stage.part}: the sum of profile shifts is {stated:.5f}, but the centre distance of "
+                    f"{stage.distance.value:g} mm requires {total:.5f}; correct addendum_modification_coefficient or "
+                    f"center_distance{option}"
+                )
     notes.errors.tell()
     return solved
 
@@ -186,7 +200,6 @@ def _zeros_with_followers(
 
 
 def _solved(gears: Mapping[int, Toothing], stages: Sequence[Stage]) -> dict[int, Toothing]:
-    """Give every gear a profile shift."""
     solved = dict(gears)
     open_stages = list(stages)
     while open_stages:
@@ -204,7 +217,6 @@ def _contradicts_distance(gears: Mapping[int, Toothing], stage: Stage) -> bool:
 
 
 def _shift_sums(gears: Mapping[int, Toothing], stage: Stage) -> tuple[float, float]:
-    """Sum of the existing shifts, and the sum that the centre distance requires."""
     pinion = gears[stage.pinion]
     gear = gears[stage.gear]
     assert pinion.signed_shift is not None and gear.signed_shift is not None
@@ -243,20 +255,6 @@ def _complete(gears: dict[int, Toothing], stage: Stage) -> None:
             rest = counted - total if gear.internal else total - counted
             shift = derived(tidy(round(rest, 9)), "from the centre distance, without backlash")
             gears[number] = dataclasses.replace(gear, shift=shift)
-
-
-def _check_shifts(gears: Mapping[int, Toothing], stage: Stage, notes: Notes) -> None:
-    stated, total = _shift_sums(gears, stage)
-    notes.checked.append(f"{stage.part}: sum of profile shifts {stated:.6f}, the centre distance requires {total:.6f}")
-    if abs(stated - total) > SHIFT_TOLERANCE:
-        option = ""
-        if notes.rules.shifts == "file":
-            option = ", or import with --shifts centre-distance, which replaces a shift of 0, or else one of the two"
-        raise RexsError(
-            f"{stage.part}: the sum of profile shifts is {stated:.5f}, but the centre distance of "
-            f"{stage.distance.value:g} mm requires {total:.5f}; correct addendum_modification_coefficient or "
-            f"center_distance{option}"
-        )
 
 
 def with_equal_racks(gears: Mapping[int, Toothing], stages: Sequence[Stage], notes: Notes) -> dict[int, Toothing]:

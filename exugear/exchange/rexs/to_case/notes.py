@@ -209,14 +209,24 @@ class ComponentPositions(ReprMixin):
         self._model = model
         self._moved: dict[int, tuple[float, float]] = {}
         self._frames: dict[int, tuple[Floats, Floats]] = {}
-        _refuse_lost_vectors(model)
+        # Some programs lost all vectors when writing JSON.
+        keys = ("support_vector", "u_axis_vector", "w_axis_vector")
+        lost = [part for part in model.components.values() if any(part.has_lost_vector(key) for key in keys)]
+        if lost:
+            more = f" and {len(lost) - 3} more" if len(lost) > 3 else ""
+            raise RexsError(
+                f"positions are not three numbers for {', '.join(map(str, lost[:3]))}{more}: arrays were lost in the "
+                "exporting program; export it again"
+            )
         errors = Errors()
         directions: dict[Component, Floats] = {}
         for part in model.components_of_type(*TURNING):
             with errors.gathered():
                 directions[part] = self._frame(part, 0)[1][:, 0]
         errors.tell()
-        self._axes = _axes(list(directions.values()), self._outermost(list(directions)))
+        # A file without a gear unit has the axes of its first part.
+        first = [*self._model.components_of_type("gear_unit"), *list(directions)][:1]
+        self._axes = _axes(list(directions.values()), self._frame(first[0], 0)[1] if first else np.eye(3))
         skew = [part for part, direction in directions.items() if abs(direction @ self._axes[2]) < 1.0 - PARALLEL]
         if skew:
             names = ", ".join(str(part) for part in skew[:3])
@@ -248,9 +258,7 @@ class ComponentPositions(ReprMixin):
 
     def sense(self, part: Component) -> int:
         """Sense of a component's u axis: 1 along +z, -1 against it."""
-        if self._frame(part, 0)[1][:, 0] @ self._axes[2] > 0.0:
-            return 1
-        return -1
+        return 1 if self._frame(part, 0)[1][:, 0] @ self._axes[2] > 0.0 else -1
 
     def axes(self, part: Component) -> Floats:
         """Axes u, v, w of a component as the rows of a (3, 3) array, in the axes of the gearbox file."""
@@ -259,11 +267,6 @@ class ComponentPositions(ReprMixin):
     def turned(self, vector: Floats) -> Floats:
         """Transform a vector from the axes of the gear unit to those of the gearbox file."""
         return np.asarray(self._axes @ vector)
-
-    def _outermost(self, parts: list[Component]) -> Floats:
-        """Axes u, v, w of the gear unit as columns; those of the first part in a file without a gear unit."""
-        first = [*self._model.components_of_type("gear_unit"), *parts][:1]
-        return self._frame(first[0], 0)[1] if first else np.eye(3)
 
     def _frame(self, part: Component, depth: int) -> tuple[Floats, Floats]:
         """Origin (3) and axes u, v, w as columns (3, 3), in the outermost frame."""
@@ -282,18 +285,6 @@ class ComponentPositions(ReprMixin):
             axes = turned @ axes
         self._frames[part.number] = origin, axes
         return origin, axes
-
-
-def _refuse_lost_vectors(model: Model) -> None:
-    """Raise an error for a file with invalid vectors; some programs lost all of them when writing JSON."""
-    keys = ("support_vector", "u_axis_vector", "w_axis_vector")
-    lost = [part for part in model.components.values() if any(part.has_lost_vector(key) for key in keys)]
-    if lost:
-        more = f" and {len(lost) - 3} more" if len(lost) > 3 else ""
-        raise RexsError(
-            f"positions are not three numbers for {', '.join(str(part) for part in lost[:3])}{more}: arrays were lost "
-            "in the exporting program; export it again"
-        )
 
 
 def _own_axes(part: Component) -> Floats:

@@ -142,19 +142,6 @@ def _bearing(
         inner, outer = outer, inner
     if inner is None:
         return None
-    _check_place(places, part, both, notes)
-    inside = _support(model, part, places.sense(both[0]), notes)
-    block = _placed(places, part, inner, outer, inside)
-    if "designation" in inside:
-        block.entries["designation"] = inside["designation"].entries["designation"]
-        block.blocks.clear()
-    if outer is None and bodies.of(both[0]) is None:
-        block.entries["outer_ring"] = read("body", "outer_part rotates")
-    return block
-
-
-def _check_place(places: ComponentPositions, part: Component, both: tuple[Component, Component], notes: Notes) -> None:
-    """Compare the position of a bearing with its coordinate on the connected shafts."""
     for side, shaft in zip(("inner", "outer"), both, strict=True):
         along = part.quantity(f"u_coordinate_on_shaft_{side}_side")
         if along is None or shaft.type != "shaft" or not shaft.given("support_vector"):
@@ -165,6 +152,14 @@ def _check_place(places: ComponentPositions, part: Component, both: tuple[Compon
                 f"{part}: z = {places.position(part)[2]:g} mm from support_vector (used), {expected:g} mm from "
                 f"u_coordinate_on_shaft_{side}_side"
             )
+    inside = _support(model, part, places.sense(both[0]), notes)
+    block = _placed(places, part, inner, outer, inside)
+    if "designation" in inside:
+        block.entries["designation"] = inside["designation"].entries["designation"]
+        block.blocks.clear()
+    if outer is None and bodies.of(both[0]) is None:
+        block.entries["outer_ring"] = read("body", "outer_part rotates")
+    return block
 
 
 def _placed(

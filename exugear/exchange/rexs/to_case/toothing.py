@@ -92,7 +92,11 @@ def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes
     module = _required(gear, "normal_module", LENGTHS)
     flank = _flank(model, gear)
     steps = _steps(model, gear)
-    tool = _root_tool(steps, internal)
+    # The tool with the largest depth generates the root; that of a ring gear is its cutter.
+    tools = [tool for tool, _ in steps]
+    if internal:
+        tools = [tool for tool in tools if tool.type == "cutter_wheel_tool"] or tools
+    tool = max(tools, key=lambda tool: tool.quantity("addendum_coefficient_reference_profile") or 0.0, default=None)
     angle = _pressure_angle(gear, flank)
     helix = _helix_angle(gear, mates)
     allowances = _allowances(gear, math.radians(angle.value), math.radians(helix.value), internal)
@@ -179,14 +183,6 @@ def _steps(model: Model, gear: Component) -> list[tuple[Component, Component | N
     return []
 
 
-def _root_tool(steps: Sequence[tuple[Component, Component | None]], internal: bool) -> Component | None:
-    """Tool that generates the root: the first of those with the largest depth; for a ring gear its cutter."""
-    tools = [tool for tool, _ in steps]
-    if internal:
-        tools = [tool for tool in tools if tool.type == "cutter_wheel_tool"] or tools
-    return max(tools, key=lambda tool: tool.quantity("addendum_coefficient_reference_profile") or 0.0, default=None)
-
-
 def _racks(steps: Sequence[tuple[Component, Component | None]], module: float) -> Iterator[Tool]:
     """Yield the racks of known depth among the tools of an external gear."""
     for tool, settings in steps:
@@ -232,9 +228,7 @@ def _shift(flank: Component | None, internal: bool) -> Entry | None:
 
 def _diameter(gear: Component, key: str) -> Entry | None:
     value = gear.quantity(key)
-    if value:
-        return read(tidy(abs(value)), key)
-    return None
+    return read(tidy(abs(value)), key) if value else None
 
 
 def _tip(gear: Component, reference: float, notes: Notes) -> Entry | None:
@@ -332,6 +326,4 @@ def material_table(material: Component | None) -> Entry | None:
     if material is None or is_rigid(material):
         return None
     values = {key: entry.value for key, entry in entries_of(READ["material"], material, zeros=True).items()}
-    if values:
-        return read(values, str(material))
-    return None
+    return read(values, str(material)) if values else None

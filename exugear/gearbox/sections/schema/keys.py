@@ -72,7 +72,11 @@ def keys() -> Iterator[Key]:
     examples = examples_by_table()
     for table, model in tables().items():
         texts = meanings(model)
-        given = _example_of_table(examples, table)
+        found: Any = examples
+        for part in filter(None, table.split(".")):
+            found = found[part]
+            found = found[0] if isinstance(found, list) else found
+        given = dict(found)
         for name, field in model.model_fields.items():
             if not _model_within(field.annotation):
                 yield _key(table, name, field, texts[name], given[name])
@@ -119,15 +123,6 @@ def _bare(kind: Any) -> Any:
         others = [part for part in get_args(kind) if part is not NoneType]
         return _bare(others[0]) if len(others) == 1 else kind
     return kind
-
-
-def _example_of_table(examples: dict[str, Any], table: str) -> dict[str, Any]:
-    """Return the example of a table; for a list of tables, of the first one."""
-    found: Any = examples
-    for part in filter(None, table.split(".")):
-        found = found[part]
-        found = found[0] if isinstance(found, list) else found
-    return dict(found)
 
 
 def _key(table: str, name: str, field: FieldInfo, meaning: str, example: object) -> Key:
@@ -226,14 +221,11 @@ def blocks() -> dict[str, str]:
     described: dict[str, str] = {}
     for table, entries in groupby(keys(), lambda key: key.table):
         block = table.partition(".")[0] or TOP
-        described[block] = described.get(block, "") + _section(table, list(entries))
+        model = tables()[table]
+        about = " ".join((model.__doc__ or "").split()) if table else "Keys before the first table."
+        lines = [f"## {f'`[{table}]`' if table else 'Top of the file'}", "", about, "", *map(_entry, entries), ""]
+        described[block] = described.get(block, "") + "\n".join(lines)
     return described
-
-
-def _section(table: str, entries: list[Key]) -> str:
-    model = tables()[table]
-    about = " ".join((model.__doc__ or "").split()) if table else "Keys before the first table."
-    return "\n".join([f"## {f'`[{table}]`' if table else 'Top of the file'}", "", about, "", *map(_entry, entries), ""])
 
 
 def _entry(key: Key) -> str:

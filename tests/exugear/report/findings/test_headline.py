@@ -14,7 +14,7 @@ from exugear.report.findings.headline import contributions_of, headline_of
 from exugear.report.findings.ranking import ranking_of_errors
 from exugear.results.spectra.waterfall import OrderLine
 from exugear.steady.settings import SpeedRange, SteadySettings
-from exugear.steady.steady_file import to_dataset
+from exugear.steady.steady_file import to_dataset, with_names
 from exugear.steady.steady_response import response_of
 from exugear.system.build import assemble
 from exugear.system.modes import modes_of
@@ -26,7 +26,7 @@ CHOICE = Choice("bushing", "line_of_action", "assemblies")
 def found(grc, stiffness, tmp_path_factory):
     """Context and results of the GRC: modes, and a steady response at few speeds and at resonances."""
     assembly = assemble(grc, CHOICE, stiffness)
-    data = to_dataset(response_of(assembly, SteadySettings(SpeedRange(-1.0, -3.0, 40), harmonics=4)))
+    data = with_names(to_dataset(response_of(assembly, SteadySettings(SpeedRange(-1.0, -3.0, 40), harmonics=4))))
     context = Context(tmp_path_factory.mktemp("grc"), grc, None, lambda what: None)
     context.assemblies[CHOICE] = assembly
     return context, StoredResults({}, {CHOICE: modes_of(assembly).to_dataset()}, (), (data,))

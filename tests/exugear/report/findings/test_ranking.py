@@ -16,7 +16,7 @@ from exugear.report.findings.ranking import HOUSING, SHAFTS, envelopes, order_am
 from exugear.report.pictures.diagrams import plot_response
 from exugear.steady.mean_system.signals import quantities_of, vector_peak
 from exugear.steady.settings import SpeedRange, SteadySettings
-from exugear.steady.steady_file import to_dataset
+from exugear.steady.steady_file import to_dataset, with_names
 from exugear.steady.steady_response import response_of
 from exugear.system.build import assemble
 
@@ -51,7 +51,12 @@ def response(operation, carried=False):
                 np.array([[[9e-6, 3e-6], [80.0, 6.0], [0.0, 0.0]], [[1e-6, 1e-6], [70.0, 30.0], [9.0, 4.0]]]),
             ),
         },
-        {"quantity": ["error", "force", "acceleration"], "signal": list(SIGNALS), "base": ["mesh"]},
+        {
+            "quantity": ["error", "force", "acceleration"],
+            "signal": list(SIGNALS),
+            "base": ["mesh"],
+            "line": ["mean", "mesh", "2 x mesh"],
+        },
         {"operating_range": json.dumps(operation), "carried_seats": json.dumps({"brg": carried}), "mounts": "[]"},
     )
 
@@ -180,7 +185,7 @@ def test_the_range_of_operation_is_stated_or_follows_from_the_rated_speed(grc):
 @pytest.mark.validation
 def test_the_ranking_of_the_grc_is_of_its_speeds_of_operation_and_of_shafts(grc, stiffness):
     assembly = assemble(grc, Choice("bushing"), stiffness)
-    data = to_dataset(response_of(assembly, SteadySettings(SpeedRange(-1.0, -3.0, 40), harmonics=4)))
+    data = with_names(to_dataset(response_of(assembly, SteadySettings(SpeedRange(-1.0, -3.0, 40), harmonics=4))))
     ranking = ranking_of(data)
     low, high = operating_range(grc)
     assert (ranking.speeds, ranking.whole, ranking.accelerates) == ((low, high), False, SHAFTS)

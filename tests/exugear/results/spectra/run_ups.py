@@ -10,7 +10,7 @@ import scipy.signal
 import xarray as xr
 
 from exugear.gearbox.versions import RUN
-from exugear.results.spectra.run_spectra import VariantRun, read_run
+from exugear.results.spectra.run_spectra import VariantRun, analysed, run_signals
 from exugear.results.spectra.waterfall import OrderLine, waterfall
 from fe_ste.tools.stores import write_dataset
 
@@ -82,6 +82,10 @@ def modes_dataset(frequencies: list[float], overall: list[float]) -> xr.Dataset:
         },
         {"mesh": ["a", "b"], "element": ["a", "bearing"], "body": ["one", "two"]},
     )
+
+
+def read_run(path, lines, modes=None, window_length=None) -> VariantRun:
+    return analysed(run_signals(path), lines, modes, window_length)
 
 
 def two_variants(folder: Path) -> tuple[VariantRun, VariantRun]:

@@ -7,10 +7,10 @@ import pytest
 
 from exugear.gearbox.units import RPM
 from exugear.results.spectra.resonances import pick_resonances
-from exugear.results.spectra.run_spectra import AbsenceRule, compare, only_in_first, read_run
+from exugear.results.spectra.run_spectra import AbsenceRule, compare, only_in_first
 from exugear.results.spectra.waterfall import waterfall
 
-from .run_ups import MESH, RATE, STORED_LINE, run_up, swept_pair, write_run
+from .run_ups import MESH, RATE, STORED_LINE, read_run, run_up, swept_pair, write_run
 
 
 def test_what_only_one_run_shows(runs):

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from exugear.results.run_file import load_run
-from exugear.results.spectra.run_spectra import read_run
 from fe_ste.tools.stores import write_dataset
 
-from .run_ups import STORED_LINE, write_run
+from .run_ups import STORED_LINE, read_run, write_run
 
 
 def test_resonances_are_found_where_they_are_and_matched_with_modes_that_can_show(runs):
