@@ -171,7 +171,7 @@ def test_lives_and_safety_factors_of_the_page_are_those_of_life(folder: Path) ->
     assert compared >= 3
     # The list of contacts has the smallest of both gears.
     (contact,) = cells_of(page, "contact-table")
-    for heading, key in (("S_H", "contact_safety"), ("S_F", "root_safety")):
+    for heading, key in (("S_H, life", "contact_safety"), ("S_F, life", "root_safety")):
         assert contact[heading] == f"{min(own[key] for own in life['flanks']):.2f}"
 
 
