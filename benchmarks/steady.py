@@ -18,7 +18,7 @@ from timing import CASE, say, timed
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.units import RPM
-from exugear.steady.balance.excitation import HarmonicBalanceModel
+from exugear.steady.balance.model import HarmonicBalanceModel
 from exugear.steady.balance.neighbours import judged_speeds, with_needed_neighbours
 from exugear.steady.balance.response import signals
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model

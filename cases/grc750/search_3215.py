@@ -33,7 +33,7 @@ import scipy.linalg
 from published import published_project
 
 from exugear import Choice, Gearbox, Project, assemble
-from exugear.steady.balance.excitation import HarmonicBalanceModel
+from exugear.steady.balance.model import HarmonicBalanceModel
 from exugear.steady.balance.response import transmission_errors
 from exugear.steady.harmonics.linear_solvers import batches_of
 from exugear.steady.mean_system.mean_system import MeanSystem

@@ -8,7 +8,7 @@ w_k, the inputs y_k of the mesh models: deflection, and where the model needs th
 position in the mesh cycle. The orders are the integer combinations of the mesh frequencies (`harmonics.lines`).
 
 **Equation** (`balance.response`): meshes act with forces F in addition to those of their mean stiffness, which is in K.
-With the compliance G(w_k) of the averaged system at the interface (`balance.excitation.HarmonicBalanceModel.at`),
+With the compliance G(w_k) of the averaged system at the interface (`balance.model.HarmonicBalanceModel.at`),
 
     y_k = y_static [k = 0] - G(w_k) F_k(y).
 
@@ -18,8 +18,8 @@ With the compliance G(w_k) of the averaged system at the interface (`balance.exc
 - `parametric` (`response.parametric_response`): the tangent stiffness over the mesh cycle; F is linear in y.
 - `nonlinear` (`nonlinear.HarmonicResidual`): the models of teeth and bearings, sampled in time.
 
-A flexible ring gear couples orders beside each other (`balance.passing_planets`), of which those that matter are kept
-(`balance.neighbours`).
+Stiffness that varies as the carrier turns, by a flexible ring gear or by planets that are not alike, couples orders
+beside each other (`balance.passing_planets`), of which those that matter are kept (`balance.neighbours`).
 
 **Solution** (`point_solver.PointSolver.response`): directly, by GMRES, or by Newton's method, at one speed.
 `steady_response` chooses the speeds, `damping_band` solves the highest peaks for other damping, and `steady_file` keeps

@@ -20,8 +20,8 @@ import numpy as np
 import scipy.linalg
 
 from exugear.results.sound.radiated_power import RadiatedPower
-from exugear.steady.balance.excitation import HarmonicBalanceModel
 from exugear.steady.balance.interface import Interface
+from exugear.steady.balance.model import HarmonicBalanceModel
 from exugear.steady.balance.response import mean_deviation_forces, transmission_errors
 from exugear.steady.campbell import ModeTracks
 from exugear.steady.harmonics.branches import NEIGHBOURS, predicted_tops, standing_peaks

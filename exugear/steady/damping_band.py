@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from exugear.gearbox.load_cases import operating_range
-from exugear.steady.balance.excitation import HarmonicBalanceModel
+from exugear.steady.balance.model import HarmonicBalanceModel
 from exugear.steady.balance.response import linear_response, parametric_response, signals
 from exugear.steady.harmonics.branches import standing_peaks
 from exugear.steady.mean_system.mean_system import MeanSystem

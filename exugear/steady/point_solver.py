@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from exugear.steady.balance.excitation import HarmonicBalanceModel
 from exugear.steady.balance.interface import Interface
+from exugear.steady.balance.model import HarmonicBalanceModel
 from exugear.steady.balance.nonlinear import (
     CHECKED,
     HarmonicResidual,

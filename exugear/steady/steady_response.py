@@ -16,8 +16,8 @@ from exugear.gearbox.units import RPM
 from exugear.results.sound.levels import a_weighted
 from exugear.results.sound.over_speed import line_frequencies
 from exugear.results.sound.radiated_power import RadiatedPower, equivalent_power
-from exugear.steady.balance.excitation import HarmonicBalanceModel
 from exugear.steady.balance.load_sharing import load_sharing
+from exugear.steady.balance.model import HarmonicBalanceModel
 from exugear.steady.balance.neighbours import judged_speeds, with_needed_neighbours
 from exugear.steady.balance.nonlinear import HarmonicResidual, Tangent, growth_of_state, turned_balance
 from exugear.steady.balance.response import Response, dissipated_and_given, exchanged_power, signals

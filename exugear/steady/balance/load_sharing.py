@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from exugear.steady.balance.excitation import HarmonicBalanceModel
+from exugear.steady.balance.model import HarmonicBalanceModel
 from exugear.steady.mean_system.displaced_pins import displaced_carriers
 from fe_ste.tools.arrays import Complexes, Floats, SingleComplexes
 

@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from exugear.steady.balance.excitation import HarmonicBalanceModel
+from exugear.steady.balance.model import HarmonicBalanceModel
 from exugear.steady.balance.response import parametric_response
 from exugear.steady.mean_system.mean_system import Steps
 from fe_ste.tools.arrays import Complexes, Floats

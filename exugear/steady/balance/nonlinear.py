@@ -17,8 +17,8 @@ from functools import cached_property
 
 import numpy as np
 
-from exugear.steady.balance.excitation import HarmonicBalanceModel
 from exugear.steady.balance.interface import Interface
+from exugear.steady.balance.model import HarmonicBalanceModel
 from exugear.steady.balance.response import Response, rates_of
 from exugear.steady.harmonics.branches import exponents, kicks_needed
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError, solve_lines
@@ -127,11 +127,11 @@ class HarmonicResidual:
         """Harmonics (m, 3 q, h + 1) over the mesh cycle of what `_stiffness` has."""
         model = self.model
         if self._curved:
-            found = [*model.cycle_curves]
-            found += [model.cycle_ways, model.cycle_moments_beyond] if model.shuttles else []
+            found = [*model.cycles.curves]
+            found += [model.cycles.ways, model.cycles.moments_beyond] if model.shuttles else []
         else:
-            found = [model.cycle_coefficients, model.cycle_pulls]
-            found += [*model.cycle_moments, model.cycle_moments_beyond] if model.shuttles else []
+            found = [model.cycles.stiffness, model.cycles.pulls]
+            found += [*model.cycles.moments, model.cycles.moments_beyond] if model.shuttles else []
         rate = 2j * np.pi * np.arange(model.harmonics + 1)
         return np.stack([curve * rate**order for curve in found for order in range(3)], axis=1)
 
@@ -584,7 +584,7 @@ def candidates(model: HarmonicBalanceModel, low: float, high: float) -> tuple[Ca
     for base, order in enumerate(model.waves.base_orders):
         of_base = np.array([wave.base == base for wave in model.waves.waves])
         for harmonic in range(1, model.harmonics + 1):
-            tangents = {at: of_base * values[:, harmonic] for at, values in model.cycle_tangents.items()}
+            tangents = {at: of_base * values[:, harmonic] for at, values in model.cycles.tangents.items()}
             turned = {at: values.conj() for at, values in tangents.items()}
             for sign in (1.0, -1.0):
                 there = _couple_modes(felt, tangents, seen.conj() if sign > 0.0 else seen)

@@ -28,8 +28,8 @@ from typing import NamedTuple
 import numpy as np
 import scipy.linalg
 
-from exugear.steady.balance.excitation import HarmonicBalanceModel, turns_of_carrier
 from exugear.steady.balance.interface import Interface
+from exugear.steady.balance.model import HarmonicBalanceModel, turns_of_carrier
 from exugear.steady.harmonics.lines import Group, HarmonicCoupling
 from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, CycleFunctions
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
@@ -202,7 +202,7 @@ def _varying_parts(
     forces = interface.ports.forces.shape[1]
     dampers = {(DEFLECTION, DEFLECTION): model.waves.damping[:, None].astype(np.complex128)}
     if model.shuttles:
-        dampers[MISALIGNMENT, MISALIGNMENT] = model.varying_tilting[:, 1:2].astype(np.complex128)
+        dampers[MISALIGNMENT, MISALIGNMENT] = model.cycles.varying_tilting[:, 1:2].astype(np.complex128)
     of_dampers = CycleFunctions(model.waves, model.varying, dampers, forces).at(interface.ports, interface.speed)
     found = []
     for family, of_damper in zip(model.varying, of_dampers, strict=True):

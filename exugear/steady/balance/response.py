@@ -21,8 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from exugear.steady.balance.excitation import HarmonicBalanceModel
 from exugear.steady.balance.interface import Interface
+from exugear.steady.balance.model import HarmonicBalanceModel
 from exugear.steady.balance.passing_planets import PassingPlanets
 from exugear.steady.harmonics.linear_solvers import solve_lines
 from exugear.steady.harmonics.lines import add_answered, flat
@@ -133,7 +133,7 @@ def linear_response(model: HarmonicBalanceModel, interface: Interface) -> Respon
 def transmission_errors(model: HarmonicBalanceModel, ports: MeshInterface, speed: float) -> Complexes:
     """Find the forces (n, m, f) that static transmission errors make of the mean stiffness, and moments, N and N m."""
     mean = model.waves.mean_stiffness[:, None]
-    compliances, ways = (_varying(own) for own in (model.cycle_compliances, model.cycle_ways))
+    compliances, ways = (_varying(own) for own in (model.cycles.compliances, model.cycles.ways))
     spectra = {(DEFLECTION, DEFLECTION): -mean * compliances}
     # What the errors go with: force, and misalignment.
     static = np.zeros(ports.forces.shape[:2])
@@ -141,10 +141,10 @@ def transmission_errors(model: HarmonicBalanceModel, ports: MeshInterface, speed
     if model.shuttles:
         static[:, MISALIGNMENT] = ports.static[: len(mean), MISALIGNMENT]
         spectra |= {(DEFLECTION, MISALIGNMENT): -mean * ways, (MISALIGNMENT, DEFLECTION): -ways}
-    found = _products_of_constants(model, model.functions(spectra), ports, speed, static)
+    found = _products_of_constants(model, model.cycles.functions(spectra), ports, speed, static)
     if model.shuttles:
-        beyond = {(MISALIGNMENT, DEFLECTION): -_varying(model.cycle_moments_beyond)}
-        found += _products_of_constants(model, model.functions(beyond), ports, speed, _everywhere(model, ports))
+        beyond = {(MISALIGNMENT, DEFLECTION): -_varying(model.cycles.moments_beyond)}
+        found += _products_of_constants(model, model.cycles.functions(beyond), ports, speed, _everywhere(model, ports))
     found[0] = 0.0
     return found
 
@@ -170,7 +170,9 @@ def deviation_forces(
     errors = forces.copy()
     errors[..., DEFLECTION] = model.deviations(interface.speed)
     forces[..., DEFLECTION] = mean_deviation_forces(model, interface.speed)
-    beyond = model.coupling.of(model.tangents_beyond_mean.at(ports, interface.speed), errors.reshape(len(errors), -1))
+    beyond = model.coupling.of(
+        model.cycles.tangents_beyond_mean.at(ports, interface.speed), errors.reshape(len(errors), -1)
+    )
     if passing is not None:
         readings = np.hstack([errors.reshape(len(errors), -1), np.zeros((len(errors), len(model.bearing_lengths)))])
         beyond += passing.damper_forces(readings)[:, : beyond.shape[1]]
@@ -193,8 +195,8 @@ class SlowChanges:
         self._lines, self._places, self._coupling = model.slow_shifts
         self._products = [wave_products(family, interface.speed) for family in model.families]
         self._rows = np.ascontiguousarray(ports.readings[: self._shape[1], POSITION].T)
-        self._by_position = self._forces_by_deflection(model.slopes_over_cycle, model.pulls_over_cycle)
-        self._by_deflection = self._forces_by_deflection(*model.bends_over_cycle) if model.waves.loads.any() else None
+        self._by_position = self._forces_by_deflection(model.cycles.slopes, model.cycles.pull_slopes)
+        self._by_deflection = self._forces_by_deflection(*model.cycles.bends) if model.waves.loads.any() else None
 
     def _forces_by_deflection(self, functions: CycleFunctions, given: CycleFunctions) -> tuple[Any, Complexes | float]:
         """Functions of the mesh cycle of a deflection as `flat` has them, and forces (n, m, f) of curves without it."""
@@ -354,7 +356,7 @@ class LineBalance:
         lengths: Floats,
         passing: PassingPlanets | None = None,
     ) -> None:
-        functions = model.tangents_beyond_mean.at(interface.ports, interface.speed)
+        functions = model.cycles.tangents_beyond_mean.at(interface.ports, interface.speed)
         if model.varying_bearings is not None:
             functions.append(model.varying_bearings.functions_at(interface.speed)[0])
         self._coupling = model.whole_coupling
@@ -411,10 +413,10 @@ def given_forces(model: HarmonicBalanceModel, interface: Interface) -> Complexes
     shape = len(model.lines.index), *ports.forces.shape[:2]
     if not (waves.loads.any() or model.shuttles):
         return np.zeros(shape, dtype=complex)
-    products = _products_of_constants(model, model.given, ports, interface.speed, _everywhere(model, ports))
+    products = _products_of_constants(model, model.cycles.given, ports, interface.speed, _everywhere(model, ports))
     products[0, :, DEFLECTION] += waves.mean_stiffness * waves.rest
     if model.shuttles:
-        products[0, :, MISALIGNMENT] += model.varying_tilting[:, 2] * [wave.wave == 0 for wave in waves.waves]
+        products[0, :, MISALIGNMENT] += model.cycles.varying_tilting[:, 2] * [wave.wave == 0 for wave in waves.waves]
     return products
 
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from exugear.steady.balance.excitation import HarmonicBalanceModel
+from exugear.steady.balance.model import HarmonicBalanceModel
 from exugear.steady.balance.response import Response, signals
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model

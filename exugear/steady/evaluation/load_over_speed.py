@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from exugear.steady.balance.excitation import HarmonicBalanceModel
+from exugear.steady.balance.model import HarmonicBalanceModel
 from exugear.steady.balance.response import signals
 from exugear.steady.damping_band import damping_limits
 from exugear.steady.evaluation.comparison import harmonic_rows, mesh_lines

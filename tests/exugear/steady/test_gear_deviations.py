@@ -10,7 +10,7 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.steady.balance.excitation import HarmonicBalanceModel
+from exugear.steady.balance.model import HarmonicBalanceModel
 from exugear.steady.balance.response import dissipated_and_given, signals
 from exugear.steady.mean_system.mesh_places import DEFLECTION
 from exugear.steady.peaks import line_name

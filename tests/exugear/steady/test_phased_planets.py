@@ -77,7 +77,7 @@ def test_errors_of_planets_out_of_phase_excite_what_sampling_their_turn_and_cycl
     forces = np.empty(places.positions.shape)
     for u, n in enumerate(places.means):
         turning = np.exp(2j * np.pi * (places.positions[:, [u]] + ahead[:, [u]]) * np.arange(1, model.harmonics + 1))
-        error = 2.0 * (turning @ model.cycle_compliances[n, 1:]).real
+        error = 2.0 * (turning @ model.cycles.compliances[n, 1:]).real
         forces[:, u] = -(waves.mean_stiffness[n] ** 2) * pressed[:, u] * error
     lines = np.fft.fft2((places.back @ forces[..., None])[..., 0].reshape(64, 32, -1), axes=(0, 1)) / 64.0 / 32.0
     found = transmission_errors(model, ports, speed)[..., 0]

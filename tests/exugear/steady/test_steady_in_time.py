@@ -225,7 +225,7 @@ def test_forces_by_products_of_lines_are_those_of_the_tangents_in_time():
     position = ports.positions[0] + ports.static[0, POSITION] + sense * angles / (2.0 * np.pi)
     turning = np.exp(2j * np.pi * position[:, None] * np.arange(model.harmonics + 1))
     turning[:, 1:] *= 2.0
-    cycles = model.cycle_coefficients, model.cycle_pulls, *model.cycle_moments, model.cycle_moments_beyond
+    cycles = model.cycles.stiffness, model.cycles.pulls, *model.cycles.moments, model.cycles.moments_beyond
     k, p, kw, pw, kww, beyond = ((turning @ own[0]).real for own in cycles)
     force, moment = k * deflection - kw * tilt - p, kww * tilt - kw * deflection + pw - beyond
     by_time = np.fft.rfft(np.stack([force, moment], axis=1), axis=0)[model.lines.index[:, 0]] / 256

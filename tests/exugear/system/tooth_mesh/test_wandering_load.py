@@ -125,9 +125,9 @@ def test_the_part_of_the_moment_in_a_peak_is_what_the_peak_lacks_without_it(tmp_
     )
     assert found.amplitude == pytest.approx(abs(whole), rel=1e-9)
     assert share == pytest.approx((own * whole.conjugate()).real / abs(whole) ** 2, rel=1e-9)
-    staying = type(model)
-    monkeypatch.setattr(staying, "cycle_ways", property(lambda given: 0.0 * model.cycle_curves[0]))
-    monkeypatch.setattr(staying, "cycle_moments_beyond", property(lambda given: 0.0 * model.cycle_curves[0]))
+    staying = type(model.cycles)
+    monkeypatch.setattr(staying, "ways", property(lambda given: 0.0 * model.cycles.curves[0]))
+    monkeypatch.setattr(staying, "moments_beyond", property(lambda given: 0.0 * model.cycles.curves[0]))
     without = transmission_errors(model, interface.ports, speed)[line]
     rest = complex(row @ np.linalg.solve(dynamic, model.loads(interface.ports) @ (-2.0 * without).ravel()))
     # The way also moves the force of misaligned teeth, which is small here.

@@ -1,4 +1,7 @@
-"""All that the balance of lines needs of a gearbox at one speed, taken from parabolas through three speeds."""
+"""A gearbox prepared for harmonic balance: its orders, and at any speed what meshes and bearings read and push along.
+
+Rows and matrices are known at three speeds of the averaged system; parabolas through these are exact between them.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +16,7 @@ from exugear.results.sound.radiated_power import RadiatedPower, radiated_power
 from exugear.steady.balance.acting_forces import acting_forces
 from exugear.steady.balance.harmonic_truncation import HarmonicTruncation
 from exugear.steady.balance.interface import Interface, LoadResponse
+from exugear.steady.balance.mesh_cycles import MeshCycles
 from exugear.steady.harmonics.linear_solvers import Batches, batches_of
 from exugear.steady.harmonics.lines import (
     Group,
@@ -41,11 +45,9 @@ from exugear.steady.mean_system.mesh_places import (
     MISALIGNMENT,
     POSITION,
     TILT,
-    CycleFunctions,
     Family,
     MeshInterface,
     MeshPlaces,
-    Spectra,
     families,
     group_of,
     mesh_places,
@@ -426,121 +428,10 @@ class HarmonicBalanceModel:
         return replace(assembly, meshes=assembly.meshes._replace(error_pieces=self.shaft_orders.error_pieces))
 
     @cached_property
-    def cycle_coefficients(self) -> Complexes:
-        """Fourier coefficients (m, harmonics + 1) of the stiffness over the mesh cycle, N/m; of curves the tangent."""
-        return self.waves.cycle_coefficients("tangent", harmonics=self.harmonics)
-
-    @cached_property
-    def cycle_compliances(self) -> Complexes:
-        """Fourier coefficients (m, harmonics + 1) of the static transmission error over the static load, m/N."""
-        return self.waves.cycle_coefficients("compliance", harmonics=self.harmonics)
-
-    @cached_property
-    def cycle_curves(self) -> tuple[Complexes, Complexes]:
-        """Fourier coefficients (m, harmonics + 1) of load over deflection (N/m), and of the exponents less one."""
-        waves = self.waves
-        harmonics = self.harmonics
-        secant = waves.cycle_coefficients("secant", harmonics=harmonics)
-        return secant, waves.cycle_coefficients("exponent", harmonics=harmonics)
-
-    @cached_property
-    def cycle_pulls(self) -> Complexes:
-        """Fourier coefficients (m, harmonics + 1) of what the tangent has more than the curve without deflection, N."""
-        return np.asarray(self.waves.loads[:, None] * self.cycle_curves[1])
-
-    @cached_property
-    def cycle_ways(self) -> Complexes:
-        """Fourier coefficients (m, harmonics + 1) of the axial shift of the load, m."""
-        return self.waves.cycle_coefficients("way", harmonics=self.harmonics)
-
-    @cached_property
-    def cycle_moments_beyond(self) -> Complexes:
-        """Fourier coefficients (m, harmonics + 1) of the moment that the static load has beyond that way, N m."""
-        return self.waves.cycle_coefficients("moment", harmonics=self.harmonics)
-
-    @cached_property
-    def cycle_moments(self) -> tuple[Complexes, Complexes, Complexes]:
-        """Fourier coefficients (m, harmonics + 1) of that way times stiffness (N), pull (N m), and squared (N m)."""
-        waves = self.waves
-        harmonics = self.harmonics
-        pulls = self.waves.loads[:, None] * waves.cycle_coefficients("exponent", "way", harmonics=harmonics)
-        return (
-            waves.cycle_coefficients("tangent", "way", harmonics=harmonics),
-            pulls,
-            waves.cycle_coefficients("tangent", "way", "way", harmonics=harmonics),
-        )
-
-    @cached_property
-    def cycle_tangents(self) -> dict[tuple[int, int], Complexes]:
-        """Derivatives (m, harmonics + 1) of the static model of each force by each reading, like those of stiffness.
-
-        Derivative over the mesh cycle of the force by the deflection; where loads shuttle, of force and moment by
-        deflection and misalignment.
-        """
-        found = {(DEFLECTION, DEFLECTION): self.cycle_coefficients}
-        if self.shuttles:
-            across, _, twice = self.cycle_moments
-            found[DEFLECTION, MISALIGNMENT] = found[MISALIGNMENT, DEFLECTION] = -across
-            found[MISALIGNMENT, MISALIGNMENT] = twice + _constant(twice, self.varying_tilting[:, 0])
-        return found
-
-    @cached_property
-    def tangents_beyond_mean(self) -> CycleFunctions:
-        """The same beyond the averaged system, as functions of the mesh cycles."""
+    def cycles(self) -> MeshCycles:
+        """What forces along a row have over the mesh cycles."""
         forces = self._ports["forces"].shape[2]
-        means = np.zeros((len(self.waves.waves), forces))
-        means[:, DEFLECTION] = self.waves.mean_stiffness
-        if self.shuttles:
-            means[:, MISALIGNMENT] = self.varying_tilting[:, 0]
-        return CycleFunctions(self.waves, self.families, self.cycle_tangents, forces, means)
-
-    @cached_property
-    def slopes_over_cycle(self) -> CycleFunctions:
-        """Derivative of the tangents by the position, N/m per cycle."""
-        return self.functions({(DEFLECTION, DEFLECTION): self._derivative * self.cycle_coefficients})
-
-    @cached_property
-    def pulls_over_cycle(self) -> CycleFunctions:
-        """Derivative of the forces that curves have without deflection by the position, N per cycle."""
-        return self.functions({(DEFLECTION, DEFLECTION): -self._derivative * self.cycle_pulls})
-
-    @cached_property
-    def bends_over_cycle(self) -> tuple[CycleFunctions, CycleFunctions]:
-        """Derivative of the tangents of curves by the deflection, N/m2, and its product with that at the load, N/m.
-
-        A curve of load over deflection is the load times the power m of deflection over that at this load.
-        """
-        waves = self.waves
-        bend = waves.cycle_coefficients("exponent", "tangent", "secant", harmonics=self.harmonics)
-        slope = waves.cycle_coefficients("exponent", "tangent", harmonics=self.harmonics)
-        curved = waves.loads[:, None] > 0.0
-        bend = np.where(curved, bend / np.where(curved, waves.loads[:, None], 1.0), 0.0)
-        key = DEFLECTION, DEFLECTION
-        return self.functions({key: bend}), self.functions({key: np.where(curved, -slope, 0.0)})
-
-    @property
-    def _derivative(self) -> Complexes:
-        """Derivative of harmonics (harmonics + 1,) by the position, 1 per cycle."""
-        return np.asarray(2j * np.pi * np.arange(self.harmonics + 1))
-
-    @cached_property
-    def given(self) -> CycleFunctions:
-        """Forces of tangents at zero deflection over the mesh cycle: of curves, and moments where loads shuttle."""
-        spectra = {(DEFLECTION, DEFLECTION): -self.cycle_pulls}
-        if self.shuttles:
-            spectra[MISALIGNMENT, DEFLECTION] = self.cycle_moments_given
-        return self.functions(spectra)
-
-    @cached_property
-    def varying_tilting(self) -> Floats:
-        """`MeshWaves.tilting` of each wave's mesh (m, 3)."""
-        return np.asarray(self.waves.tilting[[wave.first for wave in self.waves.waves]])
-
-    @cached_property
-    def cycle_moments_given(self) -> Complexes:
-        """Fourier coefficients (m, harmonics + 1) of the moments that the meshes have without deflection, N m."""
-        pulls = self.cycle_moments[1] - self.cycle_moments_beyond
-        return np.asarray(pulls - _constant(pulls, self.varying_tilting[:, 2]))
+        return MeshCycles(self.waves, self.families, self.harmonics, forces, self.shuttles)
 
     def pressed(self, static: Floats) -> Floats:
         """Deflections (m,) from where the mean stiffness has no force, at readings (m, r) of the static state, m."""
@@ -613,10 +504,6 @@ class HarmonicBalanceModel:
         multiples = turns_of_carrier(most, self.varying[0].carrier, self.lines.index.shape[1])
         group = Group(begin, len(bearings.coordinates), multiples)
         return HarmonicCoupling(self.lines, (*self.coupling.groups, group))
-
-    def functions(self, spectra: Spectra) -> CycleFunctions:
-        """Functions of the mesh cycles by their harmonics, which `coupling` takes at a speed of the input."""
-        return CycleFunctions(self.waves, self.families, spectra, self._ports["forces"].shape[2])
 
     @cached_property
     def bearing_lengths(self) -> Floats:
@@ -814,13 +701,6 @@ def turns_of_carrier(most: int, carrier: int, bases: int) -> Integers:
     """Multiples (2 most + 1, bases) of the bases' angles for functions of the angle of a carrier alone."""
     found = np.zeros((2 * most + 1, bases), dtype=np.int64)
     found[:, carrier] = np.arange(-most, most + 1)
-    return found
-
-
-def _constant(cycle: Complexes, values: Floats) -> Complexes:
-    """Coefficients, like those of a function over the mesh cycle (m, h + 1), of constants (m,)."""
-    found = np.zeros_like(cycle)
-    found[:, 0] = values
     return found
 
 
