@@ -436,7 +436,7 @@ def _response(
     """
     waves = model.waves
     shape = interface.ports.forces.shape[:2]
-    excess = forces[:, : shape[0] * shape[1]].reshape(-1, *shape)
+    excess = forces[:, : shape[0] * shape[1]].reshape(len(forces), *shape)
     of_bearings = forces[:, shape[0] * shape[1] :]
     rates = rates_of(model, interface.speed, deflection)
     force = excess[..., DEFLECTION] + waves.mean_stiffness * deflection + waves.damping * rates

@@ -92,7 +92,7 @@ def gear_load_rows(waves: MeshWaves) -> tuple[Floats, Floats, Floats]:
     for number, wave in enumerate(waves.waves):
         meshes, planets = groups[wave.first]
         shapes = np.ones((1, 1)) if planets is None else planets.shapes(0.0)[0]
-        if wave.wave >= shapes.shape[1]:  # of a flexible ring gear, which has no such signals
+        if waves.system.frame.varies_at(wave.first):
             continue
         for mesh, share in zip(meshes, shapes[:, wave.wave], strict=True):
             element = assembly.elements[mesh]

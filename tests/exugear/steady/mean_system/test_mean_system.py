@@ -7,7 +7,6 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.steady.mean_system.mean_system import mean_system, tangents
-from exugear.steady.mean_system.mesh_waves import mesh_waves
 from exugear.steady.mean_system.planet_sets import SteadyError, planet_sets
 from exugear.steady.mean_system.rotating_frame import RotatingFrame
 from exugear.steady.settings import SpeedRange, SteadySettings
@@ -108,22 +107,6 @@ def test_the_spread_of_planets_bearings_is_that_of_their_operating_points(assemb
     np.testing.assert_allclose(same.stiffness, assembly.connectors.stiffness, rtol=1e-9, atol=1e-3)
     assert left < 1e-9
     assert 0.005 < system.planet_spread < 0.05
-
-
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"bodies.planet.planet_angles_deg": [0.0, 180.0]}, "2 planets"),
-        (
-            {"bodies.planet.planet_angles_deg": [0.0, 120.0, 237.0]},
-            ".planet_angles_deg: with unequally spaced planets the",
-        ),
-    ],
-)
-def test_planets_that_the_frame_cannot_hold_are_refused_with_the_reason(grc, stiffness, changes, said):
-    made = assemble(grc.varied(changes), Choice("rigid"), stiffness)
-    with pytest.raises(SteadyError, match=said):
-        mesh_waves(mean_system(made, np.array([0.0, 10.0])))
 
 
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
