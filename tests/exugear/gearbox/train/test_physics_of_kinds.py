@@ -49,6 +49,7 @@ RATIOS = {
     "planetary, reversed torque": 24 / (24 + 72),
     "one planet": 24 / (24 + 72),
     "two planets": 24 / (24 + 72),
+    "planets, unevenly spaced": 24 / (24 + 72),
     "differential": 24 / (24 + 72),  # while the ring stands
     "stepped planets": 1.0 / (1.0 + 42 * 90 / (24 * 24)),
     "meshing planets": (24 / 72 + 24 / 30) / (1.0 + 24 / 30),
