@@ -10,11 +10,13 @@ import pytest
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.steady.balance.load_sharing import mean_planet_forces
+from exugear.steady.balance.neighbours import with_needed_neighbours
 from exugear.steady.balance.response import dissipated_and_given, parametric_response, signals
 from exugear.steady.damping_band import damping_limits
 from exugear.steady.findings import response_findings
 from exugear.steady.mean_system.mean_system import unsuitable
 from exugear.steady.mean_system.planet_sets import SteadyError
+from exugear.steady.point_solver import PointSolver
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import to_dataset
 from exugear.steady.steady_response import response_of
@@ -204,3 +206,18 @@ def test_what_is_not_supported_is_said_before_any_work():
         content["bodies"][planet]["planet_angles_deg"] = [0.0, 180.0]
     said = unsuitable(train(content))
     assert said.startswith("bodies.carrier_1, bodies.middle: stiffness varies with the angles of several carriers")
+
+
+@pytest.mark.validation
+def test_a_run_of_the_gearbox_with_two_planets_stays_on_its_steady_state(grc, stiffness):
+    """Constant speed of 10 rad/s, RK4 at 1/120 kHz, the last 1.0 of 2.0 s; catalogue bearings, which are anisotropic.
+
+    Twice the carrier's order is a fifth of the largest order, orders beside those of the meshes are a twentieth.
+    """
+    two = grc.varied({"bodies.planet.planet_angles_deg": [0.0, 180.0]})
+    assembly = assemble(two, Choice("bushing"), stiffness)
+    model = solver_of(assembly, (9.0, 11.0), "parametric", 6).model
+    solver = PointSolver(with_needed_neighbours(model, np.array([9.0, 10.0, 11.0]))[0], "parametric")
+    overall = {index: abs(line) for index, line in lines_by_order(solver, 10.0).items() if any(index)}
+    assert overall[0, 0, 0, 2] > 0.1 * max(overall.values())
+    assert apart(solver, 10.0, 2.0, 1.0 / 120e3, 1.0, assembly)[1] < 2e-3
