@@ -255,19 +255,15 @@ def simulate(
         if not resume:
             size = signal_layout(assembly).sample_bytes
             check_disk(gearbox, case, directory, total, sample_rate, sample_bytes=size)
-        return _carry_out(plan, prepare_start(plan, resume), progress)
-
-
-def _carry_out(plan: RunPlan, start: RunStart, progress: Callable[[Progress], None] | None) -> Run:
-    """Integrate to the end, or to the first error or interruption, and keep the file of a complete run."""
-    with RunFile(plan.final_path, start.pieces, plan.samples) as file:
-        meter = ProgressMeter(start.state.step * plan.step, plan.duration, progress)
-        run = _integrate(plan, start, file, meter)
-        if run.complete:
-            meter.reach(run.end)
-            start.pieces.note("complete", 1)
-            file.finish()
-    return run
+        start = prepare_start(plan, resume)
+        with RunFile(plan.final_path, start.pieces, plan.samples) as file:
+            meter = ProgressMeter(start.state.step * plan.step, plan.duration, progress)
+            run = _integrate(plan, start, file, meter)
+            if run.complete:
+                meter.reach(run.end)
+                start.pieces.note("complete", 1)
+                file.finish()
+        return run
 
 
 def _integrate(plan: RunPlan, start: RunStart, file: RunFile, meter: ProgressMeter) -> Run:

@@ -416,7 +416,12 @@ def draw_contact_stress(
     name = (field.pair.pinion, field.pair.gear)[flank.number].name.replace("_", " ")
     load = f"{field.torque:.0f} N m on gear 1, position {field.pmc:.2f} of the mesh cycle, {field.method}"
     highest_point = flank.points[flank.highest] + flank.displacement[flank.highest]
-    top = 1e-6 * _top_stress(field, flank.points[flank.highest])
+    # The highest stress in the section, not the peaks at edges of other teeth.
+    points = np.concatenate([sector.points for sector in field.sectors])
+    apart = np.abs(points - flank.points[flank.highest])
+    shown = np.hypot(apart[:, 0], apart[:, 1]) < 0.5 * _SECTION_HEIGHT * field.pair.pinion.transverse_module
+    layer = apart[:, 2] <= max(float(apart[shown, 2].min()), 0.02 * field.pair.face_width)
+    top = 1e-6 * float(field.von_mises[shown & layer].max())
     views = (
         (f"flank of the {name} from the front", _flank_view(field, gear, flank, magnification, top, size)),
         (f"section at z = {1e3 * highest_point[2]:.1f} mm", _section_view(field, flank, highest_point, top, size)),
@@ -501,15 +506,6 @@ class _LoadedFlank:
             upward=upward / np.linalg.norm(upward),
             middle=middle,
         )
-
-
-def _top_stress(field: StressField, point: Floats) -> float:
-    """Upper end of the stress colours: the highest in the section, not the peaks at edges of other teeth."""
-    points = np.concatenate([sector.points for sector in field.sectors])
-    apart = np.abs(points - point)
-    shown = np.hypot(apart[:, 0], apart[:, 1]) < 0.5 * _SECTION_HEIGHT * field.pair.pinion.transverse_module
-    layer = apart[:, 2] <= max(float(apart[shown, 2].min()), 0.02 * field.pair.face_width)
-    return float(field.von_mises[shown & layer].max())
 
 
 def _grid(field: StressField, number: int, bricks: Integers, magnification: float) -> pyvista.UnstructuredGrid:

@@ -166,7 +166,13 @@ def nonlinear_position(
     half_width = hertz_half_width(pair, normal_load(pair, torque) / least_contact_length(pair))
     sectors = refined_gears(pair, settings.mesh, pmc, half_width, settings.teeth, settings.closed)
     model = gear_model(pair, torque, sectors, settings.finite_deformation)
-    model = replace(model, clearance=_removed(pair, sectors, model, modifications))
+    # Material removed from both flanks at the nodes of the loaded flanks of gear 1.
+    x, y, z = model.bricks.points[model.first.nodes].T
+    removed = np.zeros(len(z))
+    for gear, mesh, modification in zip((pair.pinion, pair.gear), sectors, modifications, strict=True):
+        radius = np.clip(np.hypot(x - mesh.axis_x, y), *flank_radii(gear))
+        removed = removed + modification.gap(gear, radius, z)
+    model = replace(model, clearance=removed)
     try:
         equilibrium = solve_contact(model, settings.newton, report)
     except EquilibriumError as error:
@@ -236,18 +242,6 @@ def gear_model(
             if mesh.others is not None
         ),
     )
-
-
-def _removed(
-    pair: GearPair, meshes: tuple[GearMesh, GearMesh], model: ContactModel, modifications: Modifications
-) -> Floats:
-    """Material removed from both flanks at the nodes of the loaded flanks of gear 1, m."""
-    x, y, z = model.bricks.points[model.first.nodes].T
-    removed = np.zeros(len(z))
-    for gear, mesh, modification in zip((pair.pinion, pair.gear), meshes, modifications, strict=True):
-        radius = np.clip(np.hypot(x - mesh.axis_x, y), *flank_radii(gear))
-        removed = removed + modification.gap(gear, radius, z)
-    return removed
 
 
 def _load_share(sector: GearMesh, model: ContactModel, equilibrium: Equilibrium) -> dict[int, float]:

@@ -297,7 +297,14 @@ def reduce_component(
     normal, frequencies = free_interface_modes(loaded_mass, stiffness, rigid, (np.pi * band) ** 2, band, backend)
     # Less the constraint modes that move the seats alike, a normal mode leaves the seats where they are.
     inner = np.hstack([normal - constraint @ (seats @ normal), relief])
-    modes = np.hstack([constraint, _uncoupled(mass, stiffness, inner)])
+    # Shapes that span the same, uncoupled from each other, of unit modal mass.
+    inner = inner / np.sqrt(np.einsum("im,im->m", inner, mass @ inner))
+    share, axes = np.linalg.eigh(inner.T @ (mass @ inner))
+    # Shapes that others span already have no mass of their own.
+    independent = share > INDEPENDENCE_TOLERANCE
+    inner = inner @ (axes[:, independent] / np.sqrt(share[independent]))
+    _, axes = np.linalg.eigh(inner.T @ (stiffness @ inner))
+    modes = np.hstack([constraint, inner @ axes])
     count = len(seats)
     reduced_mass = modes.T @ (mass @ modes)
     reduced_mass[:count, :count] += blanks
@@ -435,17 +442,6 @@ def _converged(diagonal: list[float], beside: list[float], shift: float, band: f
     return None
 
 
-def _uncoupled(mass: SparseMatrix, stiffness: SparseMatrix, inner: Floats) -> Floats:
-    """Shapes that span `inner` (n, m), uncoupled from each other, of unit modal mass; what is nothing left out."""
-    inner = inner / np.sqrt(np.einsum("im,im->m", inner, mass @ inner))
-    share, axes = np.linalg.eigh(inner.T @ (mass @ inner))
-    # Shapes that others span already have no mass of their own.
-    independent = share > INDEPENDENCE_TOLERANCE
-    inner = inner @ (axes[:, independent] / np.sqrt(share[independent]))
-    _, axes = np.linalg.eigh(inner.T @ (stiffness @ inner))
-    return np.asarray(inner @ axes)
-
-
 def symmetric(matrix: Floats) -> Floats:
     """Symmetric part of a matrix, free of the round-off of products."""
     return 0.5 * (matrix + matrix.T)
@@ -579,7 +575,18 @@ def load_or_reduce(path: Path, key: str, reduce: Callable[[], ReducedBody]) -> R
     body = store.read(_from_arrays)
     if body is None:
         body = reduce()
-        store.write(_arrays_of(body), compressed=True)
+        words = {
+            "name": body.name,
+            "seats": [[seat.name, seat.position] for seat in body.seats],
+            "frame": body.frame,
+            "groups": body.modal_groups,
+            "figures": {stored: getattr(body.summary, name) for stored, name in _SUMMARY.items()},
+        }
+        arrays = {name: getattr(body, name) for name in _MATRICES}
+        arrays |= {name: getattr(body.surface, name) for name in _SURFACE}
+        if body.radiating is not None:
+            arrays |= {f"radiating_{name}": np.array(getattr(body.radiating, name)) for name in _RADIATING}
+        store.write({"words": np.array(json.dumps(words)), **arrays}, compressed=True)
     return body
 
 
@@ -593,21 +600,6 @@ _SUMMARY = {
     "lowered": "mass_scaled_frequencies",
 }
 """Names in files, which stay so that old files are found again, and in `ReductionSummary`."""
-
-
-def _arrays_of(body: ReducedBody) -> dict[str, NDArray[Any]]:
-    words = {
-        "name": body.name,
-        "seats": [[seat.name, seat.position] for seat in body.seats],
-        "frame": body.frame,
-        "groups": body.modal_groups,
-        "figures": {stored: getattr(body.summary, name) for stored, name in _SUMMARY.items()},
-    }
-    arrays = {name: getattr(body, name) for name in _MATRICES}
-    arrays |= {name: getattr(body.surface, name) for name in _SURFACE}
-    if body.radiating is not None:
-        arrays |= {f"radiating_{name}": np.array(getattr(body.radiating, name)) for name in _RADIATING}
-    return {"words": np.array(json.dumps(words)), **arrays}
 
 
 def _from_arrays(arrays: Mapping[str, NDArray[Any]]) -> ReducedBody:

@@ -305,7 +305,11 @@ def _wheel_error(
     deviation = gearbox.deviations.get(wheel)
     if deviation is None:
         return np.zeros(0)
-    error = _run_out_error(deviation, contact)
+    # Way of the teeth's axis along the line of action, away from the other wheel.
+    x, y, _ = MeshGeometry.of(contact.mesh).plane_of_action(contact.flank)
+    away = -1.0 if contact.number == 1 else 1.0
+    angle = deviation.eccentricity_angle + _angles(deviation)
+    error = np.asarray(away * deviation.eccentricity * (x * np.cos(angle) + y * np.sin(angle)))
     if deviation.pitch.size:
         error = error + _pitch_error(deviation, contact, orientation[wheel], phase)
     return error
@@ -333,11 +337,3 @@ def _pitch_error(deviation: WheelDeviation, contact: ToothContact, orientation: 
         inside = (ahead >= 0) & (ahead < len(pairs))
         error[inside] += gap * shares[inside, ahead[inside]]
     return error
-
-
-def _run_out_error(deviation: WheelDeviation, contact: ToothContact) -> Floats:
-    """Way of the teeth's axis along the line of action, away from the other wheel."""
-    x, y, _ = MeshGeometry.of(contact.mesh).plane_of_action(contact.flank)
-    away = -1.0 if contact.number == 1 else 1.0
-    angle = deviation.eccentricity_angle + _angles(deviation)
-    return np.asarray(away * deviation.eccentricity * (x * np.cos(angle) + y * np.sin(angle)))

@@ -231,23 +231,6 @@ def element_loads(contacts: RowContacts, displacement: Floats) -> Floats:
     return load
 
 
-def element_pressures(contacts: RowContacts, displacement: Floats) -> Floats:
-    """Return the maximum Hertzian pressure of each rolling element on a raceway, row by row, Pa, shape (elements,).
-
-    For rollers it is the pressure of the most loaded lamina, on the inner raceway, which is the more curved one;
-    pressures at the very end of a roller, higher than Hertzian, are neglected. For balls it is the pressure on the
-    raceway of lower conformity.
-    """
-    pressure = np.zeros(contacts.first[-1])
-    if contacts.laminae is not None:
-        laminae = contacts.laminae
-        np.maximum.at(pressure, laminae.element, laminae.pressure * np.sqrt(lamina_loads(laminae, displacement)))
-    if contacts.balls is not None:
-        balls = contacts.balls
-        pressure[balls.element] = balls.pressure * np.cbrt(ball_loads(balls, displacement))
-    return pressure
-
-
 def loads_of_laminae(contacts: RowContacts, displacement: Floats) -> tuple[Floats | None, ...]:
     """Load of each lamina, N, for each row an array (elements, laminae); None for rows of balls."""
     if contacts.laminae is None:
@@ -305,11 +288,20 @@ class BearingState(ReprMixin):
 
 def bearing_state(contacts: RowContacts, displacement: Floats) -> BearingState:
     """Evaluate loads and pressures of a bearing at a displacement of the inner ring, shape (6,)."""
+    # The most loaded lamina of a roller on the inner raceway, which is the more curved one; pressures at the very end
+    # of a roller, higher than Hertzian, are neglected. Balls: the raceway of lower conformity.
+    pressure = np.zeros(contacts.first[-1])
+    if contacts.laminae is not None:
+        laminae = contacts.laminae
+        np.maximum.at(pressure, laminae.element, laminae.pressure * np.sqrt(lamina_loads(laminae, displacement)))
+    if contacts.balls is not None:
+        balls = contacts.balls
+        pressure[balls.element] = balls.pressure * np.cbrt(ball_loads(balls, displacement))
     return BearingState(
         displacement=displacement,
         load=bearing_load(contacts, displacement),
         element_load=element_loads(contacts, displacement),
-        element_pressure=element_pressures(contacts, displacement),
+        element_pressure=pressure,
         lamina_load=loads_of_laminae(contacts, displacement),
         contacts=contacts,
     )

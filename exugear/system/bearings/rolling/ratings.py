@@ -126,8 +126,12 @@ def basic_dynamic_rating(rows: Sequence[RollingRow], bearing_type: BearingType) 
         size = length * row.element_count**0.75 * diameter ** (29.0 / 27.0)
         return float(MATERIAL_FACTOR[bearing_type] * line_contact_factor(row.diameter_ratio) * size)
     size = diameter**1.8 if diameter <= LARGE_BALL else 3.647 * diameter**1.4
+    # The table of f_c covers outer grooves up to 0.53 by its values for 0.52.
+    inner, outer = _static_conformities(row, bearing_type)
     factor = point_contact_factor(
-        row.diameter_ratio, *_dynamic_conformities(row, bearing_type), _ball_reduction(bearing_type, count)
+        row.diameter_ratio,
+        *(inner, outer if bearing_type == "self_aligning_ball" else outer - (OUTER_CONFORMITY - INNER_CONFORMITY)),
+        _ball_reduction(bearing_type, count),
     )
     size *= (count * cosine) ** 0.7 * row.element_count ** (2.0 / 3.0)
     return float(MATERIAL_FACTOR[bearing_type] * factor * size)
@@ -311,12 +315,6 @@ def _static_conformities(row: BallRow, bearing_type: BearingType) -> tuple[float
     if bearing_type == "self_aligning_ball":
         return max(inner, SELF_ALIGNING_CONFORMITY), outer
     return max(inner, INNER_CONFORMITY), max(outer, OUTER_CONFORMITY)
-
-
-def _dynamic_conformities(row: BallRow, bearing_type: BearingType) -> tuple[float, float]:
-    """Return the same for f_c, whose table covers outer grooves up to 0.53 by its values for 0.52."""
-    inner, outer = _static_conformities(row, bearing_type)
-    return inner, outer if bearing_type == "self_aligning_ball" else outer - (OUTER_CONFORMITY - INNER_CONFORMITY)
 
 
 def _ball_load(across: float, along: float, pressure: float) -> float:
