@@ -35,6 +35,7 @@ import scipy
 import scipy.linalg
 from numpy.typing import NDArray
 
+from exugear.system.bodies.matrix_files.interface import rigid_motions
 from exugear.system.kernels.coordinates import AXIAL, BODY_SIZE, TILT
 from fe_ste.tools.arrays import Floats, Integers, SparseMatrix
 from fe_ste.tools.display import ReprMixin
@@ -196,12 +197,7 @@ class ReducedBody(
 
     def rigid_motions(self, centre: Sequence[float] | Floats) -> Floats:
         """Rigid motions (n, 6): translations, and turns about a centre (3,) in the gearbox's coordinates."""
-        motions = np.zeros((self.size, 6))
-        for n, seat in enumerate(self.seats):
-            x, y, z = np.asarray(seat.position) - np.asarray(centre)
-            motions[6 * n : 6 * n + 6] = np.eye(6)
-            motions[6 * n : 6 * n + 3, 3:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
-        return motions
+        return rigid_motions(self.size, [seat.position for seat in self.seats], centre)
 
     @cached_property
     def rigid_inertia(self) -> RigidInertia:

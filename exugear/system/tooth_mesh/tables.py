@@ -399,6 +399,12 @@ def _request(
     return TableRequest(name, wanted, path, stored)
 
 
+def figure(values: xr.DataArray | float) -> float | None:
+    """Return a main result as a number, None if it is not one."""
+    value = float(values)
+    return None if math.isnan(value) else value
+
+
 def summarise(request: TableRequest, table: MeshTable) -> dict[str, Any]:
     """Return the main results of a table; the unit is part of the key.
 
@@ -406,12 +412,6 @@ def summarise(request: TableRequest, table: MeshTable) -> dict[str, Any]:
     """
     data = table.static_state
     pair = request.wanted.pair
-
-    def figure(values: xr.DataArray | float) -> float | None:
-        value = float(values)
-        if value == value:
-            return value
-        return None
 
     return {
         "pair": request.name,
