@@ -551,11 +551,6 @@ def with_rigid_inertia(body: ReducedBody, wanted: RigidInertia) -> ReducedBody:
     return replace(body, mass=symmetric(mass), gyroscopic=0.5 * (gyroscopic - gyroscopic.T))
 
 
-def with_stiffness_factor(body: ReducedBody, factor: float) -> ReducedBody:
-    """Return the same body with its stiffness times a factor."""
-    return replace(body, stiffness=factor * body.stiffness)
-
-
 # Reductions of elastic bodies, stored in files by the hash of their input
 
 

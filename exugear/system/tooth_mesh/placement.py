@@ -180,11 +180,6 @@ def friction_rows(mesh: Mesh, flank: int, nodes: tuple[Floats, Floats]) -> Float
     return np.array([wrench_row(force, pitch_point_of(mesh, geometry, nodes), nodes), turning, tilting])
 
 
-def mesh_phases(gearbox: Gearbox, flanks: Mapping[str, int]) -> dict[str, float]:
-    """Compute the PMC of each mesh at zero angles: see `tooth_places`."""
-    return tooth_places(gearbox, flanks)[0]
-
-
 def tooth_places(gearbox: Gearbox, flanks: Mapping[str, int]) -> tuple[dict[str, float], dict[tuple[str, str], float]]:
     """Place the teeth of all wheels from tooth numbers, planet places and tooth thickness.
 

@@ -335,9 +335,11 @@ def equilibrium(
 
     Examples
     --------
-    >>> from exugear.system.bearings.rolling.rows import CylindricalRollerBearing
-    >>> bearing = CylindricalRollerBearing(bore=0.160, outside_diameter=0.290, width=0.080)
-    >>> state = equilibrium(bearing, (129.9e3, 0.0, 0.0))
+    >>> from exugear.gearbox.sections.connections import CatalogueSection
+    >>> from exugear.system.bearings.rolling.catalogue import catalogue_rows
+    >>> from exugear.system.bearings.rolling.rows import BearingOfRows
+    >>> section = CatalogueSection(type="cylindrical_roller", bore_mm=160.0, outer_diameter_mm=290.0, width_mm=80.0)
+    >>> state = equilibrium(BearingOfRows(catalogue_rows(section)), (129.9e3, 0.0, 0.0))
     >>> round(1e6 * state.displacement[0])  # micrometres
     53
     """
@@ -448,9 +450,11 @@ def pitch_averaged_tangent(bearing: RollingBearing, force: ArrayLike, positions:
 
     Examples
     --------
-    >>> from exugear.system.bearings.rolling.rows import CylindricalRollerBearing
-    >>> bearing = CylindricalRollerBearing(bore=0.100, outside_diameter=0.180, width=0.046)
-    >>> stiffness = pitch_averaged_tangent(bearing, (33.5e3, 0.0, 0.0))
+    >>> from exugear.gearbox.sections.connections import CatalogueSection
+    >>> from exugear.system.bearings.rolling.catalogue import catalogue_rows
+    >>> from exugear.system.bearings.rolling.rows import BearingOfRows
+    >>> section = CatalogueSection(type="cylindrical_roller", bore_mm=100.0, outer_diameter_mm=180.0, width_mm=46.0)
+    >>> stiffness = pitch_averaged_tangent(BearingOfRows(catalogue_rows(section)), (33.5e3, 0.0, 0.0))
     >>> float(round(stiffness[0, 0] / 1e9, 1))
     1.9
     """

@@ -12,7 +12,6 @@ import scipy.linalg
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.system.bearings.rolling.contact import pitch_averaged_tangent
-from exugear.system.bearings.rolling.rows import BearingPair, TaperedRollerBearing
 from exugear.system.bearings.stiffness import axially_symmetric
 from exugear.system.bodies.of_gearbox import shaft_model
 from exugear.system.bodies.reduction import ReducedBody
@@ -27,6 +26,7 @@ from exugear.transient.exudyn_model.system import ExudynSystem
 
 from ...cases.assembled import assembled, modes_with_bodies
 from ...cases.plain_motion import accelerations_of
+from ...cases.roller_bearings import BearingPair, TaperedRollerBearing
 
 TORQUE = {"main_shaft": 240e3}
 YOUNG, SHEAR, DENSITY = 206e9, 206e9 / 2.6, 7850.0
