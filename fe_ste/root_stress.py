@@ -67,7 +67,12 @@ def gauge_places(mesh: SectorMesh) -> GaugePlaces:
     depths = []
     for side, flank in ((1, section.plus_flank), (-1, section.minus_flank)):
         cut = section.plus_cut if side > 0 else section.minus_cut
-        chain = _chain(loose, int(flank[0 if not mesh.gear.internal else -1]), set(flank.tolist()), set(cut.tolist()))
+        # Nodes of the outline from the end of the flank, away from it, to the first node of the cut face.
+        chain = [int(flank[0 if not mesh.gear.internal else -1])]
+        before = set(flank.tolist())
+        while chain[-1] not in cut:
+            before.add(chain[-1])
+            chain.append(next(node for node in loose[chain[-1]] if node not in before))
         points = section.points[chain]
         along = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
         for place, (first, second) in enumerate(itertools.pairwise(chain)):
@@ -78,16 +83,6 @@ def gauge_places(mesh: SectorMesh) -> GaugePlaces:
     found = np.array(edges)
     middles = section.points[found].mean(axis=1)
     return GaugePlaces(found, np.array(sides), np.array(depths), np.hypot(*middles.T))
-
-
-def _chain(loose: dict[int, list[int]], start: int, flank: set[int], cut: set[int]) -> list[int]:
-    """Nodes of the outline from the end of a flank, away from it, to the first node of a cut face."""
-    chain = [start]
-    before = set(flank)
-    while chain[-1] not in cut:
-        before.add(chain[-1])
-        chain.append(next(node for node in loose[chain[-1]] if node not in before))
-    return chain
 
 
 def gauge_columns(mesh: SectorMesh, places: GaugePlaces) -> SparseMatrix:

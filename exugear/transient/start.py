@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -79,15 +80,9 @@ def refuse_to_resume(directory: Path) -> str:
     return f"{directory}: no interrupted run with these settings"
 
 
-def kept_duration(directory: Path) -> float | None:
-    """Read how long a stopped run was to be, s; None where that is not kept."""
-    kept = kept_attributes(directory / PARTIAL_NAME).get("duration")
-    return kept and float(kept)
-
-
-def kept_band(directory: Path) -> float | None:
-    """Read the band that a stopped run keeps, Hz; None where that is not kept."""
-    kept = kept_attributes(directory / PARTIAL_NAME).get("band")
+def kept_setting(directory: Path, name: Literal["duration", "band"]) -> float | None:
+    """Read how long a stopped run was to be (s), or the band that it keeps (Hz); None where that is not kept."""
+    kept = kept_attributes(directory / PARTIAL_NAME).get(name)
     return kept and float(kept)
 
 

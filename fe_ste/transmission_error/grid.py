@@ -153,7 +153,7 @@ def solve_grid(
     try:
         blocks = _blocks(axes, finished)
         done = (
-            _solved_here(compliance, axes, blocks, tell)
+            ((block, solve_positions(compliance, block.axes(axes), block.positions, tell)) for block in blocks)
             if executor is None
             else _solved_by_workers(compliance, axes, blocks, executor)
         )
@@ -179,13 +179,6 @@ def _blocks(axes: StateAxes, finished: Booleans) -> list[_Block]:
     runs = [tuple(run.tolist()) for run in np.array_split(np.arange(positions), math.ceil(positions / length))]
     blocks = [_Block(run, distance) for distance in range(distances) for run in runs]
     return [block for block in blocks if not finished[list(block.positions), block.distance].all()]
-
-
-def _solved_here(
-    compliance: PairCompliance, axes: StateAxes, blocks: list[_Block], tell: Callable[[int], None]
-) -> Iterator[tuple[_Block, StateResults]]:
-    for block in blocks:
-        yield block, solve_positions(compliance, block.axes(axes), block.positions, tell)
 
 
 def _solved_by_workers(
