@@ -205,10 +205,6 @@ def _check_values(gear: GearInputs) -> None:
             raise _refuse_gear(gear, key, f"{value!r}", "must be a finite number, zero or above (SI units)")
     if not _is_number(gear.profile_shift):
         raise _refuse_gear(gear, "profile_shift", f"{gear.profile_shift!r}", "must be a finite number")
-    _check_ranges(gear)
-
-
-def _check_ranges(gear: GearInputs) -> None:
     least, most = PRESSURE_ANGLE_RANGE
     angle = gear.normal_pressure_angle
     if not _is_number(angle) or not least <= angle <= most:
@@ -294,7 +290,10 @@ def _check_cutter(gear: GearInputs, cutter: PinionCutter) -> None:
         remedy = "says the root diameter, too: leave it or root_diameter out"
         raise _refuse_gear(gear, "cutter.tip_diameter", _mm(cutter.tip_diameter), remedy)
     _check_cutter_tooth(gear, cutter)
-    _check_flank_of_ring(gear)
+    _check_tip_outside_base(gear)
+    if gear.form_radius <= gear.tip_radius:
+        remedy = f"leaves no involute: it must lie below the form diameter of {_mm(2.0 * gear.form_radius)}"
+        raise _refuse_gear(gear, "tip_diameter", _mm(2.0 * gear.tip_radius), remedy)
     _check_trimmed_tips(gear)
 
 
@@ -312,14 +311,6 @@ def _check_cutter_tooth(gear: GearInputs, cutter: PinionCutter) -> None:
     if cut.rounding > cut.largest_rounding + LENGTH_TOLERANCE * module:
         remedy = f"does not fit on the cutter's tip: at most {cut.largest_rounding / module:.4f}, a full round"
         raise _refuse_gear(gear, "cutter.tip_radius", f"{cutter.tip_radius:g}", remedy)
-
-
-def _check_flank_of_ring(gear: GearInputs) -> None:
-    """Refuse tips inside the base circle, and a cutter that leaves no involute."""
-    _check_tip_outside_base(gear)
-    if gear.form_radius <= gear.tip_radius:
-        remedy = f"leaves no involute: it must lie below the form diameter of {_mm(2.0 * gear.form_radius)}"
-        raise _refuse_gear(gear, "tip_diameter", _mm(2.0 * gear.tip_radius), remedy)
 
 
 def _check_trimmed_tips(gear: GearInputs) -> None:

@@ -327,9 +327,6 @@ class _EquilibriumSearch:
         self.history: list[Iteration] = []
         hub = self.model.hub
         self.largest_load = max(float(np.abs(self.model.forces).max()), abs(hub.force) if hub else 0.0)
-        self._check_start()
-
-    def _check_start(self) -> None:
         if not self.largest_load > 0.0:
             raise EquilibriumError("load step 1: there is no load")
         gap = self._facing_gap(self.at_rest)

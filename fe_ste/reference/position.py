@@ -18,7 +18,7 @@ from typing import TypeAlias
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fe_ste.contact.kinematics import Cells
+from fe_ste.contact.kinematics import Cells, pinion_flank_points
 from fe_ste.elasticity.gear_mesh import ContactMesh, GearMesh, refined_gears
 from fe_ste.flanks import FlankModification
 from fe_ste.geometry.gears import GearPair
@@ -401,18 +401,12 @@ def _point_loads(
     pair: GearPair, cells: Cells, force: Floats, rotation: float, compliance: PairCompliance
 ) -> tuple[Floats, Floats]:
     """Points (p, 3) on the flanks of gear 1 and the forces (p,) at them."""
-    pinion = pair.pinion
     loaded = force > 0.0
     share = (np.arange(_POINTS_ACROSS) + 0.5) / _POINTS_ACROSS * 2.0 - 1.0
-    half_roll = (cells.half_across / (pinion.base_radius * cells.roll))[loaded]
+    half_roll = (cells.half_across / (pair.pinion.base_radius * cells.roll))[loaded]
     roll = cells.roll[loaded][:, None] + half_roll[:, None] * share
-    height = np.broadcast_to(compliance.axial[cells.layer][loaded][:, None], roll.shape)
-    working = pair.working_pressure_angle
-    twist = math.tan(pinion.base_helix_angle) / pinion.base_radius
-    turned = rotation + cells.tooth[loaded][:, None] * pinion.angular_pitch + twist * height
-    polar = (math.tan(working) - working) - (roll - np.arctan(roll)) + turned
-    radius = pinion.base_radius * np.sqrt(1.0 + roll**2)
-    load_points = np.stack([radius * np.cos(polar), radius * np.sin(polar), height], axis=-1)
+    axial = compliance.axial[cells.layer][loaded][:, None]
+    load_points = pinion_flank_points(pair, roll, cells.tooth[loaded][:, None], axial, rotation)
     return load_points.reshape(-1, 3), np.repeat(force[loaded] / _POINTS_ACROSS, _POINTS_ACROSS)
 
 

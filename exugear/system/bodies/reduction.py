@@ -36,7 +36,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from exugear.system.bodies.matrix_files.interface import rigid_motions
-from exugear.system.kernels.coordinates import AXIAL, BODY_SIZE, TILT
+from exugear.system.kernels.coordinates import AXIAL, TILT
 from fe_ste.tools.arrays import Floats, Integers, SparseMatrix
 from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.stores import Store
@@ -171,20 +171,6 @@ class ReducedBody(
             if unknowns
             else f"matrices of {self.size} coordinates"
         )
-
-    def first_coordinate(self, seat_name: str) -> int:
-        """Find the first of a seat's six coordinates.
-
-        Raises
-        ------
-        ReductionError
-            No seat of that name.
-        """
-        for n, seat in enumerate(self.seats):
-            if seat.name == seat_name:
-                return BODY_SIZE * n
-        names = ", ".join(seat.name for seat in self.seats)
-        raise ReductionError(f"body {self.name}: no seat {seat_name!r}; seats are {names}")
 
     @cached_property
     def blocks(self) -> tuple[Integers, ...]:

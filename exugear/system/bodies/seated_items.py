@@ -8,6 +8,7 @@ from typing import Generic, Protocol, TypeVar
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Bearing, Body
+from exugear.gearbox.sections.bodies import ExternalSeatSection, SolidSeatSection
 from exugear.gearbox.units import MM, si
 from exugear.system.bearings.stiffness import mounts_at_work
 from exugear.system.bodies.reduction import Frame
@@ -69,20 +70,13 @@ def items_on(gearbox: Gearbox, body: Body) -> dict[str, Item]:
     return items
 
 
-class _SeatSection(Protocol):
-    """Entry of a seat in the file."""
-
-    @property
-    def same_as(self) -> str | None: ...
-
-
 class _NamedSeat(Protocol):
     @property
     def name(self) -> str: ...
 
 
 Model = TypeVar("Model")
-Section = TypeVar("Section", bound=_SeatSection)
+Section = TypeVar("Section", ExternalSeatSection, SolidSeatSection)
 Seat = TypeVar("Seat", bound=_NamedSeat)
 
 

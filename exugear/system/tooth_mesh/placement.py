@@ -38,7 +38,6 @@ class MeshGeometry:
     tangential: Floats
     pressure_angle: float
     pinion_radius: float
-    gear_radius: float
 
     @classmethod
     def of(cls, mesh: Mesh) -> MeshGeometry:
@@ -53,7 +52,6 @@ class MeshGeometry:
             tangential=np.array([-radial[1], radial[0], 0.0]),
             pressure_angle=angle,
             pinion_radius=pair.pinion.base_radius / math.cos(angle),
-            gear_radius=pair.gear.base_radius / math.cos(angle),
         )
 
     def plane_of_action(self, flank: int) -> Floats:

@@ -128,11 +128,9 @@ def basic_dynamic_rating(rows: Sequence[RollingRow], bearing_type: BearingType) 
     size = diameter**1.8 if diameter <= LARGE_BALL else 3.647 * diameter**1.4
     # The table of f_c covers outer grooves up to 0.53 by its values for 0.52.
     inner, outer = _static_conformities(row, bearing_type)
-    factor = point_contact_factor(
-        row.diameter_ratio,
-        *(inner, outer if bearing_type == "self_aligning_ball" else outer - (OUTER_CONFORMITY - INNER_CONFORMITY)),
-        _ball_reduction(bearing_type, count),
-    )
+    if bearing_type != "self_aligning_ball":
+        outer -= OUTER_CONFORMITY - INNER_CONFORMITY
+    factor = point_contact_factor(row.diameter_ratio, inner, outer, _ball_reduction(bearing_type, count))
     size *= (count * cosine) ** 0.7 * row.element_count ** (2.0 / 3.0)
     return float(MATERIAL_FACTOR[bearing_type] * factor * size)
 
@@ -172,10 +170,7 @@ def basic_static_rating(rows: Sequence[RollingRow], bearing_type: BearingType) -
         return 220.0 * (1.0 - row.diameter_ratio) * loaded * 1e3 * row.effective_length * diameter
     if isinstance(row, RollerRow):
         return 44.0 * (1.0 - row.diameter_ratio) * elements * 1e3 * row.effective_length * diameter
-    pressure = 4600.0 if bearing_type == "self_aligning_ball" else 4200.0
-    return (
-        static_factor(row.diameter_ratio, *_static_conformities(row, bearing_type), pressure) * elements * diameter**2
-    )
+    return row_static_factor(row, bearing_type) * elements * diameter**2
 
 
 def equivalent_load(
