@@ -79,7 +79,10 @@ class Factorisation(ABC):
         ValueError
             `rhs` has the wrong number of rows, or the factorisation was closed.
         """
-        self._check_usable(rhs)
+        if self._closed:
+            raise ValueError(f"the factorisation of {self.unknowns} unknowns was closed: factorise again")
+        if rhs.shape[0] != self.unknowns:
+            raise ValueError(f"right-hand sides have {rhs.shape[0]} rows; the matrix has {self.unknowns}")
         if rhs.ndim == 1:
             return self._solve_dense(_dense_columns(rhs.reshape(-1, 1)))[:, 0]
         solution = np.empty(rhs.shape, order="F")
@@ -104,12 +107,6 @@ class Factorisation(ABC):
         """Release the factor's memory."""
         self.close()
 
-    def _check_usable(self, vectors: Floats | SparseMatrix) -> None:
-        if self._closed:
-            raise ValueError(f"the factorisation of {self.unknowns} unknowns was closed: factorise again")
-        if vectors.shape[0] != self.unknowns:
-            raise ValueError(f"right-hand sides have {vectors.shape[0]} rows; the matrix has {self.unknowns}")
-
     @abstractmethod
     def _solve_dense(self, rhs: Floats) -> Floats:
         """Solve for a Fortran-ordered (n, k) array."""
@@ -125,7 +122,10 @@ class PardisoFactorisation(Factorisation):
     name = "pardiso"
 
     def __init__(self, matrix: SparseMatrix) -> None:
-        _point_out_mkl()
+        # Without a path to MKL, pypardiso searches the whole environment for each solver it creates.
+        libraries = sorted(Path(sys.prefix).glob("lib/libmkl_rt.so*"))
+        if libraries:
+            os.environ.setdefault("PYPARDISO_MKL_RT", str(libraries[0]))
         from pypardiso import PyPardisoSolver
         from pypardiso.pardiso_wrapper import PyPardisoError
 
@@ -229,41 +229,21 @@ def factorise(matrix: SparseMatrix, backend: Backend | None = None) -> Factorisa
     if chosen not in installed:
         raise ValueError(f"sparse back end {chosen!r} is not installed; installed: {', '.join(installed)}")
     rows = matrix.tocsr()
-    _check_diagonal(rows)
-    factorisation = _BACKENDS[chosen](rows)
-    _check_recovers_known_solution(rows, factorisation)
-    return factorisation
-
-
-def _check_diagonal(matrix: SparseMatrix) -> None:
-    """Refuse what needs no factorisation to be seen: PARDISO ends the process on an empty row."""
-    bad = np.flatnonzero(~(matrix.diagonal() > 0.0))
+    # PARDISO ends the process on an empty row.
+    bad = np.flatnonzero(~(rows.diagonal() > 0.0))
     if bad.size:
         raise _not_positive_definite(
-            matrix.shape[0], f"{bad.size} diagonal entries are not positive, the first of unknown {bad[0]}"
+            rows.shape[0], f"{bad.size} diagonal entries are not positive, the first of unknown {bad[0]}"
         )
-
-
-def _check_recovers_known_solution(matrix: SparseMatrix, factorisation: Factorisation) -> None:
-    """Close and reject a factor that does not reproduce a known solution.
-
-    Rounding gives a singular matrix tiny pivots of either sign, so pivots alone do not show that it is singular; a
-    component of the null space in the solution does.
-    """
-    known = np.random.default_rng(0).uniform(-1.0, 1.0, matrix.shape[0])
-    error = np.abs(factorisation.solve(matrix @ known) - known).max()
+    factorisation = _BACKENDS[chosen](rows)
+    # Rounding gives a singular matrix tiny pivots of either sign, so pivots alone do not show that it is singular; a
+    # component of the null space in the solution does.
+    known = np.random.default_rng(0).uniform(-1.0, 1.0, rows.shape[0])
+    error = np.abs(factorisation.solve(rows @ known) - known).max()
     if not error < LARGEST_PROBE_ERROR:
         factorisation.close()
-        raise _not_positive_definite(
-            matrix.shape[0], f"a known solution comes back with a relative error of {error:.1e}"
-        )
-
-
-def _point_out_mkl() -> None:
-    """Set the path to MKL for pypardiso, which otherwise searches the whole environment for each solver it creates."""
-    libraries = sorted(Path(sys.prefix).glob("lib/libmkl_rt.so*"))
-    if libraries:
-        os.environ.setdefault("PYPARDISO_MKL_RT", str(libraries[0]))
+        raise _not_positive_definite(rows.shape[0], f"a known solution comes back with a relative error of {error:.1e}")
+    return factorisation
 
 
 def _not_positive_definite(unknowns: int, reason: str) -> FactorisationError:

@@ -25,7 +25,7 @@ import scipy.sparse
 from fe_ste.elasticity.condensation import Chain, flank_functionals, ring_faces, sector_halves, turn_signs
 from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, sector_mesh
 from fe_ste.geometry.gears import Gear, GearPair
-from fe_ste.tools.arrays import Booleans, Floats, Integers, SparseMatrix
+from fe_ste.tools.arrays import Floats, Integers, SparseMatrix
 from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.threads import one_dense_thread
 from fe_ste.transmission_error.contact_stress import PATH_MARGIN
@@ -54,14 +54,25 @@ class GaugePlaces(ReprMixin, line=": {edges!n} edges"):
 def gauge_places(mesh: SectorMesh) -> GaugePlaces:
     """Find the edges of the root's surface, from the end of each flank to the cut face."""
     section = mesh.section
-    loose = _loose_edges(section.quads)
+    # The outline of the section consists of the edges that belong to one quadrilateral alone.
+    pairs = np.sort(np.stack([section.quads, np.roll(section.quads, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
+    unique, counts = np.unique(pairs, axis=0, return_counts=True)
+    loose: dict[int, list[int]] = {}
+    for one, other in unique[counts == 1].tolist():
+        loose.setdefault(one, []).append(other)
+        loose.setdefault(other, []).append(one)
     corners = np.bincount(section.quads.ravel(), minlength=len(section.points))
     edges = []
     sides = []
     depths = []
     for side, flank in ((1, section.plus_flank), (-1, section.minus_flank)):
         cut = section.plus_cut if side > 0 else section.minus_cut
-        chain = _chain(loose, int(flank[0 if not mesh.gear.internal else -1]), set(flank.tolist()), set(cut.tolist()))
+        # Nodes of the outline from the end of the flank, away from it, to the first node of the cut face.
+        chain = [int(flank[0 if not mesh.gear.internal else -1])]
+        before = set(flank.tolist())
+        while chain[-1] not in cut:
+            before.add(chain[-1])
+            chain.append(next(node for node in loose[chain[-1]] if node not in before))
         points = section.points[chain]
         along = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
         for place, (first, second) in enumerate(itertools.pairwise(chain)):
@@ -72,27 +83,6 @@ def gauge_places(mesh: SectorMesh) -> GaugePlaces:
     found = np.array(edges)
     middles = section.points[found].mean(axis=1)
     return GaugePlaces(found, np.array(sides), np.array(depths), np.hypot(*middles.T))
-
-
-def _loose_edges(quads: Integers) -> dict[int, list[int]]:
-    """Neighbours of each node along edges that belong to one quadrilateral alone: the outline of the section."""
-    pairs = np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
-    unique, counts = np.unique(pairs, axis=0, return_counts=True)
-    neighbours: dict[int, list[int]] = {}
-    for first, second in unique[counts == 1].tolist():
-        neighbours.setdefault(first, []).append(second)
-        neighbours.setdefault(second, []).append(first)
-    return neighbours
-
-
-def _chain(loose: dict[int, list[int]], start: int, flank: set[int], cut: set[int]) -> list[int]:
-    """Nodes of the outline from the end of a flank, away from it, to the first node of a cut face."""
-    chain = [start]
-    before = set(flank)
-    while chain[-1] not in cut:
-        before.add(chain[-1])
-        chain.append(next(node for node in loose[chain[-1]] if node not in before))
-    return chain
 
 
 def gauge_columns(mesh: SectorMesh, places: GaugePlaces) -> SparseMatrix:
@@ -304,7 +294,11 @@ def mesh_cycle_stress(pair: GearPair, states: xr.Dataset, gauges: tuple[RootGaug
     twist = math.tan(pinion.base_helix_angle)
     path = pair.path_pitch_point + pair.transverse_base_pitch * (pmc[:, None, None] + tooth[:, None]) + twist * axial
     hertz = hertz_stress(pair, loads, path[:, None, None])
-    inside, near = _zones(pair, path)
+    length = pair.path_end - pair.path_start
+    margin = PATH_MARGIN * length
+    reach = PITCH_ZONE * length
+    inside = (path > pair.path_start + margin) & (path < pair.path_end - margin)
+    inside, near = inside, np.abs(path - pair.path_pitch_point) < reach
     force = loads.sum(axis=(3, 4))
     beyond = (path < pair.path_start) | (path > pair.path_end)
     face = loads.sum(axis=3).mean(axis=0)
@@ -351,15 +345,6 @@ def _path_of_gear(pair: GearPair, path: Floats) -> Floats:
     if pair.gear.internal:
         return np.asarray(path + (pair.gear.base_radius - pair.pinion.base_radius) * slope)
     return np.asarray((pair.gear.base_radius + pair.pinion.base_radius) * slope - path)
-
-
-def _zones(pair: GearPair, path: Floats) -> tuple[Booleans, Booleans]:
-    """Return which points lie inside the path without its margins, and which near the pitch point."""
-    length = pair.path_end - pair.path_start
-    margin = PATH_MARGIN * length
-    reach = PITCH_ZONE * length
-    inside = (path > pair.path_start + margin) & (path < pair.path_end - margin)
-    return inside, np.abs(path - pair.path_pitch_point) < reach
 
 
 def _root_extremes(

@@ -85,7 +85,14 @@ def assemble(
     only_rolls = law in LAWS and not LAWS[law].has_force
     if only_rolls and not variant.spins_only:
         raise VariantError(f"mesh model {law}: a kinematic constraint, which requires the variant rigid, not {variant}")
-    flexible = _chosen_bodies(elastic, bodies or {})
+    bodies = bodies or {}
+    missing = [name for name in elastic if name not in bodies]
+    if missing:
+        raise VariantError(
+            f"variant flexible: no reduced body for {', '.join(missing)}; pass the result of "
+            "exugear.system.bodies.of_gearbox.reduced_bodies"
+        )
+    flexible = {name: bodies[name] for name in elastic}
     if any(body.reduced.frame == "carrier" for body in flexible.values()):
         gearbox = with_damping_times(gearbox)
     rigid = [body for body in moving if body.name not in flexible]
@@ -103,6 +110,10 @@ def assemble(
     displaced = gearbox.pin_offsets if not variant.has_bearings else {}  # bearings carry the planets along
     settings = (inertias, flanks, angles, displaced, nodes, contact)
     elements = () if only_rolls else mesh_elements(gearbox, stiffness, law_of(law), *settings)
+    pairs = [
+        [coordinates[_attached(coordinates, body, c.seat) or body][5] for body in (c.first, c.second)]
+        for c in gearbox.couplings
+    ]
     assembly = Assembly(
         gearbox=gearbox,
         choice=replace(choice, inertias=inertias),
@@ -115,7 +126,11 @@ def assemble(
         supports=supports,
         connectors=_connectors(gearbox, supports, nodes, coordinates),
         spring_names=tuple(coupling.name for coupling in gearbox.couplings),
-        springs=_springs(gearbox, coordinates),
+        springs=SpringArrays(
+            coordinates=np.array(pairs, dtype=np.int64).reshape(-1, 2),
+            stiffness=np.array([c.stiffness for c in gearbox.couplings]),
+            damping=np.array([c.damping for c in gearbox.couplings]),
+        ),
         inertia=_inertia(variant, six, alone),
         elastic_bodies=flexible,
         elastic=elastic_arrays(flexible, size, gearbox.case.damping.body_time_s),
@@ -123,17 +138,6 @@ def assemble(
         rows_stiffness=np.zeros((len(supports), 6, 6)),
     )
     return with_modal_damping(linearise_at_static_load(assembly, like))
-
-
-def _chosen_bodies(names: tuple[str, ...], bodies: Mapping[str, ElasticBody]) -> dict[str, ElasticBody]:
-    """Reduced bodies of the elastic ones, in their order."""
-    missing = [name for name in names if name not in bodies]
-    if missing:
-        raise VariantError(
-            f"variant flexible: no reduced body for {', '.join(missing)}; pass the result of "
-            "exugear.system.bodies.of_gearbox.reduced_bodies"
-        )
-    return {name: bodies[name] for name in names}
 
 
 def _take_seats(
@@ -280,18 +284,6 @@ def _rolling_motions(gearbox: Gearbox, coordinates: Mapping[str, tuple[int, ...]
     motions = np.zeros((len(order), free.shape[1]))
     motions[order] = free
     return motions
-
-
-def _springs(gearbox: Gearbox, coordinates: Mapping[str, tuple[int, ...]]) -> SpringArrays:
-    pairs = [
-        [coordinates[_attached(coordinates, body, c.seat) or body][5] for body in (c.first, c.second)]
-        for c in gearbox.couplings
-    ]
-    return SpringArrays(
-        coordinates=np.array(pairs, dtype=np.int64).reshape(-1, 2),
-        stiffness=np.array([c.stiffness for c in gearbox.couplings]),
-        damping=np.array([c.damping for c in gearbox.couplings]),
-    )
 
 
 def _supports(gearbox: Gearbox, flexible: Mapping[str, ElasticBody]) -> tuple[Bearing, ...]:

@@ -98,9 +98,11 @@ def _held_directions(gearbox: Gearbox, variant: Variant, starts: Mapping[str, in
         motion = np.zeros((6, size))
         for name, sense in ((support.body, 1.0), (support.on, -1.0)):
             if name in starts:
-                motion[:, starts[name] : starts[name] + 6] += sense * _motion_at(
-                    bodies[name], np.array(support.position)
-                )
+                # Motion at the support for unit coordinates of the body.
+                x, y, z = np.array(support.position) - _node(bodies[name])
+                moved = np.eye(6)
+                moved[:3, 3:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
+                motion[:, starts[name] : starts[name] + 6] += sense * moved
         stiffness = linear_law(support, 0.0).stiffness
         values, vectors = np.linalg.eigh(_SCALE * stiffness * _SCALE[:, None])
         yield from (vectors[:, values > HOLDING_SHARE * values[-1]].T / _SCALE) @ motion * np.tile(_SCALE, len(starts))
@@ -124,14 +126,6 @@ def _held_directions(gearbox: Gearbox, variant: Variant, starts: Mapping[str, in
 
 def _node(body: Body) -> Floats:
     return np.array([*body.axis, body.centre_of_mass_z])
-
-
-def _motion_at(body: Body, position: Floats) -> Floats:
-    """Motion (6, 6) at a position for unit coordinates of a body."""
-    x, y, z = position - _node(body)
-    motion = np.eye(6)
-    motion[:3, 3:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
-    return motion
 
 
 def _rolling_motions(gearbox: Gearbox, moving: list[Body], starts: Mapping[str, int]) -> Floats:

@@ -60,13 +60,15 @@ def with_modal_damping(assembly: Assembly, percent: float | None = None) -> Asse
         section = DampingSection(modal_percent=percent)
     q = static_state(assembly).q
     linear = linearise(assembly, q)
-    modes = real_modes(linear.mass, linear.total_stiffness, assembly.motions)
-    frequency = modes[0]
+    # Only the symmetric part of the stiffness is used.
+    free = unit_mass_motions(linear.mass, assembly.motions)
+    values, vectors = np.linalg.eigh(free.T @ (0.5 * (linear.total_stiffness + linear.total_stiffness.T)) @ free)
+    frequency = np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi)
     damped = frequency > RIGID_BODY_LIMIT
     if assembly.elastic_bodies:
         damped &= frequency <= assembly.gearbox.case.elasticity.band_Hz
     frequency = frequency[damped]
-    shapes = modes[1][:, damped]
+    shapes = (free @ vectors)[:, damped]
     stated = np.einsum("im,ij,jm->m", shapes, linear.total_damping + of_bodies, shapes)
     wanted = 2.0 * damping_ratios(section, frequency) * 2.0 * np.pi * frequency
     columns = linear.mass @ shapes * np.sqrt(np.maximum(wanted - stated, 0.0))
@@ -171,16 +173,6 @@ def damping_ratios(section: DampingSection, frequency: Floats) -> Floats:
             )
         ratios[np.argmin(place)] = 0.01 * percent_of_mode
     return np.asarray(ratios)
-
-
-def real_modes(mass: Floats, stiffness: Floats, motions: Floats) -> tuple[Floats, Floats]:
-    """Return frequencies (n,), Hz, and mass-orthogonal shapes (size, n) of unit modal mass.
-
-    Only the symmetric part of the stiffness is used. `motions` (size, n) are the free motions.
-    """
-    free = unit_mass_motions(mass, motions)
-    values, vectors = np.linalg.eigh(free.T @ (0.5 * (stiffness + stiffness.T)) @ free)
-    return np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi), free @ vectors
 
 
 def unit_mass_motions(mass: Floats, motions: Floats) -> Floats:

@@ -453,7 +453,14 @@ def modes_of(assembly: Assembly, preload: bool = True) -> Modes:
     assembly = assembly if preload else assembly.unloaded
     q = static_state(assembly).q if preload else np.zeros(assembly.size)
     linear = linearise(assembly, q)
-    frequency, shapes = undamped_modes(linear.mass, linear.total_stiffness, assembly.motions)
+    # A preloaded connector or the law `tangential` makes the stiffness unsymmetric. Equal frequencies may then come out
+    # as a complex pair that differs from real by round-off; its real and imaginary parts span the same plane.
+    free = unit_mass_motions(linear.mass, assembly.motions)
+    values, vectors = scipy.linalg.eig(free.T @ linear.total_stiffness @ free)
+    shapes = free @ np.where(values.imag < 0.0, vectors.imag, vectors.real)
+    order = np.argsort(values.real)
+    frequency = np.sqrt(np.maximum(values.real[order], 0.0)) / (2.0 * np.pi)
+    shapes = shapes[:, order]
     if assembly.elastic_bodies:  # beyond the band the bodies' normal modes are only what keeps their statics right
         inside = frequency <= assembly.gearbox.case.elasticity.band_Hz
         frequency = frequency[inside]
@@ -621,21 +628,6 @@ def counterparts(before: Modes, after: Modes) -> tuple[NDArray[np.int64], Floats
 
     _, place = scipy.optimize.linear_sum_assignment(share.T, maximize=True)
     return np.asarray(place, dtype=np.int64), share[place, np.arange(len(place))]
-
-
-def undamped_modes(mass: Floats, stiffness: Floats, motions: Floats | None = None) -> tuple[Floats, Floats]:
-    """Solve M x'' + K x = 0 for frequencies (Hz, ascending) and real shapes; M symmetric, K any.
-
-    A preloaded connector or the law `tangential` makes K unsymmetric. Equal frequencies may then come out as a complex
-    pair that differs from real by round-off; its real and imaginary parts span the same plane. `motions` (size, n) are
-    those that are free, all by default.
-    """
-    free = unit_mass_motions(mass, np.eye(len(mass)) if motions is None else motions)
-    values, vectors = scipy.linalg.eig(free.T @ stiffness @ free)
-    shapes = free @ np.where(values.imag < 0.0, vectors.imag, vectors.real)
-    order = np.argsort(values.real)
-    frequency = np.sqrt(np.maximum(values.real[order], 0.0)) / (2.0 * np.pi)
-    return frequency, shapes[:, order]
 
 
 def growth_rate(linear: Linearised) -> float:

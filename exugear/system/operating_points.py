@@ -95,7 +95,14 @@ def linearise_at_static_load(assembly: Assembly, like: Assembly | None = None) -
     BalanceError
         The static load cannot be held.
     """
-    assembly, near = _with_contacts(assembly)
+    # The load distribution of teeth from finite-element contact at static gear positions.
+    near = None
+    even = assembly
+    for _ in range(CONTACT_STEPS if contact_places(assembly, np.zeros(assembly.size)) else 0):
+        near, _laws = _loaded_state(assembly, near)
+        assembly = even.with_contacts(static_contacts(contact_places(assembly, near)))
+    for remark in assembly.contacts.remarks:
+        _log_warning(remark)
     if not any(is_catalogued(support) for support in assembly.supports):
         return assembly
     if near is None and like is not None and like.known_rest and like.coordinates == assembly.coordinates:
@@ -105,7 +112,16 @@ def linearise_at_static_load(assembly: Assembly, like: Assembly | None = None) -
     at_rest, laws = _with_placed_rows(assembly, first_points)
     q = _balance(at_rest, laws, near=q)
     static = _state(at_rest, laws, q)
-    in_motion, spread = _laws_in_motion(at_rest, laws, static, _states_over_turns(at_rest, laws, static))
+    # States over the turn of each carrier with unequal planets, from that at the angles zero.
+    over_turns: dict[str, list[_SupportState]] = {}
+    equal = _equal(at_rest)
+    unequal = [planets for planets in planet_families(at_rest.bodies) if planets not in equal]
+    for carrier in sorted({planets[0].carrier or "" for planets in unequal}):
+        over_turns[carrier] = [static]
+        for turn in 2.0 * math.pi / CARRIER_ANGLES * np.arange(1, CARRIER_ANGLES):
+            about = rolled_coordinates(at_rest, carrier, float(turn))
+            over_turns[carrier].append(_state(at_rest, laws, _balance(at_rest, laws, about)))
+    in_motion, spread = _laws_in_motion(at_rest, laws, static, over_turns)
     linearised = replace(
         at_rest,
         connectors=in_motion,
@@ -115,18 +131,6 @@ def linearise_at_static_load(assembly: Assembly, like: Assembly | None = None) -
     )
     linearised.known_rest.append(q)
     return linearised
-
-
-def _with_contacts(assembly: Assembly) -> tuple[Assembly, Floats | None]:
-    """Set the load distribution of teeth by finite-element contact at static gear positions; return the last state."""
-    near = None
-    even = assembly
-    for _ in range(CONTACT_STEPS if contact_places(assembly, np.zeros(assembly.size)) else 0):
-        near, _laws = _loaded_state(assembly, near)
-        assembly = even.with_contacts(static_contacts(contact_places(assembly, near)))
-    for remark in assembly.contacts.remarks:
-        _log_warning(remark)
-    return assembly, near
 
 
 @cache
@@ -252,21 +256,6 @@ def _state(assembly: Assembly, laws: Sequence[SupportLaw], q: Floats) -> _Suppor
     return _SupportState(strain, assembly.support_loads_at_rest(q), _points(assembly, laws, strain))
 
 
-def _states_over_turns(
-    assembly: Assembly, laws: Sequence[SupportLaw], static: _SupportState
-) -> dict[str, list[_SupportState]]:
-    """States over the turn of each carrier with unequal planets, from that at the angles zero."""
-    over_turns: dict[str, list[_SupportState]] = {}
-    equal = _equal(assembly)
-    unequal = [planets for planets in planet_families(assembly.bodies) if planets not in equal]
-    for carrier in sorted({planets[0].carrier or "" for planets in unequal}):
-        over_turns[carrier] = [static]
-        for turn in 2.0 * math.pi / CARRIER_ANGLES * np.arange(1, CARRIER_ANGLES):
-            about = rolled_coordinates(assembly, carrier, float(turn))
-            over_turns[carrier].append(_state(assembly, laws, _balance(assembly, laws, about)))
-    return over_turns
-
-
 def _laws_in_motion(
     assembly: Assembly, laws: Sequence[SupportLaw], static: _SupportState, over_turns: dict[str, list[_SupportState]]
 ) -> tuple[ConnectorArrays, float]:
@@ -328,15 +317,11 @@ def bearing_points(assembly: Assembly) -> tuple[OperatingPoint, ...]:
         if point is not None:
             found.append(point)
         elif support.catalogue is not None:
-            found.append(_stated_point(support))
+            displacement = _stated_displacement(support.catalogue)
+            found.append(
+                replace(operating_point(support, displacement, False), stiffness=catalogue_stiffness(support.catalogue))
+            )
     return tuple(found)
-
-
-def _stated_point(bearing: Bearing) -> OperatingPoint:
-    """Operating point of a bearing whose load the file states: along x, the stiffness the same in all directions."""
-    assert bearing.catalogue is not None
-    displacement = _stated_displacement(bearing.catalogue)
-    return replace(operating_point(bearing, displacement, False), stiffness=catalogue_stiffness(bearing.catalogue))
 
 
 @lru_cache(maxsize=64)

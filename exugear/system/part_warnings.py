@@ -411,8 +411,12 @@ def pair_margins(spec: PairSpec) -> PairMargins:
     pair = spec.pair
     torque = spec.static_torque
     first, second = (gear.tip_thickness / gear.normal_module for gear in (pair.pinion, pair.gear))
+    tangent = pair.base_tangent_length
+    on_pinion = pair.pinion_roll_length(pair.gear.tip_roll_length)
+    pinion_tip = pair.pinion.tip_roll_length
+    on_gear = tangent + pinion_tip if pair.gear.internal else tangent - pinion_tip
     return PairMargins(
-        form=_form_margins(pair),
+        form=(_margin(pair.pinion, on_pinion), _margin(pair.gear, on_gear)),
         tip_thickness=(first, second),
         nominal_contact_stress=nominal_contact_stress(pair, max(torque, 0.0) / pair.pinion.reference_radius),
     )
@@ -480,15 +484,6 @@ def backlash_range(gearbox: Gearbox, pair: GearPair) -> tuple[float, float, floa
         share = math.cos(gear.transverse_pressure_angle) * across
         ends = [end + share * (thinning - gear.tooth_thinning) for end, thinning in zip(ends, thinnings, strict=True)]
     return given + ends[0], given, given + ends[1]
-
-
-def _form_margins(pair: GearPair) -> tuple[float, float]:
-    """Margins of both gears, as `PairMargins` has them."""
-    tangent = pair.base_tangent_length
-    on_pinion = pair.pinion_roll_length(pair.gear.tip_roll_length)
-    pinion_tip = pair.pinion.tip_roll_length
-    on_gear = tangent + pinion_tip if pair.gear.internal else tangent - pinion_tip
-    return _margin(pair.pinion, on_pinion), _margin(pair.gear, on_gear)
 
 
 def _margin(gear: Gear, roll_length: float) -> float:

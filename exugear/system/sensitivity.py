@@ -13,7 +13,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Body
 from exugear.system.bodies.elastic_body import ElasticBody
 from exugear.system.build import assemble
-from exugear.system.modes import Modes, modes_of
+from exugear.system.modes import Modes, modes_of, participation
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.contact_state import MeshContactState
 from exugear.system.tooth_mesh.element import MeshData
@@ -109,16 +109,10 @@ def vary_parameter(parameter: Parameter, progress: Callable[[], None] | None = N
     for n, modes in enumerate(modes_of_values):
         followed = follow_modes(modes_of_values[n - 1], modes, followed) if n else followed
         highest = modes.amplification.max(axis=1, initial=0.0)
-        values = np.array([modes.frequency, _mobility_shares(modes), highest, modes.damping_ratio])
+        values = np.array([modes.frequency, participation(modes.overall), highest, modes.damping_ratio])
         figures.append(values[:, followed])
     frequency, share, amplification, damping = np.stack(figures, axis=1)
     return ParameterVariation(parameter, frequency, share, amplification, damping)
-
-
-def _mobility_shares(modes: Modes) -> Floats:
-    """Share of each mode in the mobility of the overall transmission error, shape (n,)."""
-    squares: Floats = modes.overall**2
-    return squares / max(float(np.sum(squares)), 1e-300)
 
 
 def follow_modes(before: Modes, after: Modes, followed: Integers) -> Integers:
@@ -273,7 +267,7 @@ class FrequencyMatch(ReprMixin, line=" {parameter.label} = {value:.3g}: {frequen
     @property
     def share(self) -> float:
         """Share of the mode in the mobility of the overall transmission error, 0 to 1."""
-        return float(_mobility_shares(self.modes)[self.index])
+        return float(participation(self.modes.overall)[self.index])
 
 
 def frequency_matches(
@@ -290,7 +284,7 @@ def frequency_matches(
     for variation in variations:
         for value in variation.crossings(frequency, least_share):
             modes = modes_of(variation.parameter.build(value))
-            visible = np.flatnonzero(_mobility_shares(modes) >= least_share)
+            visible = np.flatnonzero(participation(modes.overall) >= least_share)
             # Between two values modes may exchange their shapes: then none is there that was looked for.
             if not visible.size:
                 continue

@@ -91,6 +91,13 @@ class Signal(Variable):
         return self.dimensions == ("balance_time",) and bool(self.filled_by)
 
 
+def _work_taken(name: str, long_name: str, *filled_by: str) -> Signal:
+    """Work that a part of the model takes from the system, as a term of the energy balance."""
+    convention = "positive: taken from the system"
+    return Signal(name, ("balance_time",), "J", long_name, convention, filled_by=filled_by, is_power=True)
+
+
+_ELEMENT_OBSERVERS = ("observe_meshes", "observe_connectors", "observe_springs", "observe_elastic_bodies")
 SIGNALS = (
     Signal("time", ("time",), "s", "time from the start of the run"),
     Signal(
@@ -253,62 +260,20 @@ SIGNALS = (
         ("balance_time",),
         "J",
         "elastic energy of meshes, supports, couplings and bodies",
-        filled_by=(
-            "observe_meshes",
-            "observe_connectors",
-            "observe_springs",
-            "observe_elastic_bodies",
-        ),
+        filled_by=_ELEMENT_OBSERVERS,
     ),
-    Signal(
-        "dissipated_energy",
-        ("balance_time",),
-        "J",
-        "work of all dampers since the start",
-        sign_convention="positive: taken from the system",
-        filled_by=(
-            "observe_meshes",
-            "observe_connectors",
-            "observe_springs",
-            "observe_elastic_bodies",
-        ),
-        is_power=True,
-    ),
-    Signal(
+    _work_taken("dissipated_energy", "work of all dampers since the start", *_ELEMENT_OBSERVERS),
+    _work_taken(
         "work_of_varying_stiffness",
-        ("balance_time",),
-        "J",
         "work of the time-varying stiffness over the mesh cycle, since the start",
-        sign_convention="positive: taken from the system",
-        filled_by=("observe_meshes",),
-        is_power=True,
+        "observe_meshes",
     ),
-    Signal(
-        "non_conservative_work",
-        ("balance_time",),
-        "J",
-        "non-conservative work of the mesh model seed, since the start",
-        sign_convention="positive: taken from the system",
-        filled_by=("observe_meshes",),
-        is_power=True,
+    _work_taken(
+        "non_conservative_work", "non-conservative work of the mesh model seed, since the start", "observe_meshes"
     ),
-    Signal(
-        "tooth_friction_work",
-        ("balance_time",),
-        "J",
-        "work of the friction of the teeth since the start",
-        sign_convention="positive: taken from the system",
-        filled_by=("observe_meshes",),
-        is_power=True,
-    ),
-    Signal(
-        "bearing_rate_work",
-        ("balance_time",),
-        "J",
-        "work of bearings with rotating rolling elements, since the start",
-        sign_convention="positive: taken from the system",
-        filled_by=("observe_connectors",),
-        is_power=True,
+    _work_taken("tooth_friction_work", "work of the friction of the teeth since the start", "observe_meshes"),
+    _work_taken(
+        "bearing_rate_work", "work of bearings with rotating rolling elements, since the start", "observe_connectors"
     ),
 )
 """All signals, in the order of the file.

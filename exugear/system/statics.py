@@ -48,7 +48,6 @@ class Linearised(ReprMixin, line=": {mass!n} coordinates, {stiffness!n} elements
     """Mass, and stiffness and damping by element, about a state; each matrix (size, size)."""
 
     mass: Floats
-    """(size, size)"""
     stiffness: Mapping[str, Floats]
     damping: Mapping[str, Floats]
     """Element name -> matrix; elements are meshes, bearings, couplings, elastic bodies."""

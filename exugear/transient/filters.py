@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from exugear.system.signals import AXES, SignalLayout, signal_layout
+from exugear.system.signals import AXES, signal_layout
 from exugear.system.system import Assembly
 from exugear.transient.compiled.integrator import Method, ahead_of_correction
 from exugear.transient.compiled.packing import spinning_alone
@@ -253,7 +253,19 @@ def stored_filter(assembly: Assembly, method: Method, step: float, factor: int) 
     """
     layout = signal_layout(assembly)
     plain = plain_filter(factor, layout.count)
-    lags = _lags(assembly, layout, step)
+    # By how many steps what each column holds is ahead of a position; NaN where nothing is put right.
+    lags = np.full(layout.count, np.nan)
+    for name in POSITIONS:
+        if name in layout:
+            lags[layout[name].start + _meshes(assembly)] = 0.0
+    connectors = assembly.with_linear_supports().connectors
+    stiffness = connectors.stiffness
+    damping = connectors.damping
+    # The ratio where damping is in proportion to stiffness, and its mean where a file gives both.
+    sizes = np.maximum((stiffness**2).sum(axis=(1, 2)), np.finfo(np.float64).tiny)
+    times = np.maximum((stiffness * damping).sum(axis=(1, 2)) / sizes, 0.0)
+    for name in FORCES if len(times) else ():
+        lags[layout[name]] = np.repeat(times / step, len(AXES))
     if not method.is_multistep or np.isnan(lags).all():
         return plain
     half = max(plain.half, TAPS_PER_FACTOR // 2)  # at a factor of 1 nothing else is filtered
@@ -275,23 +287,6 @@ def stored_filter(assembly: Assembly, method: Method, step: float, factor: int) 
 def _meshes(assembly: Assembly) -> Integers:
     """Meshes that the loop leaves as they were evaluated."""
     return np.flatnonzero(~spinning_alone(assembly.meshes))
-
-
-def _lags(assembly: Assembly, layout: SignalLayout, step: float) -> Floats:
-    """By how many steps what each column holds is ahead of a position (columns,); NaN where nothing is put right."""
-    lags = np.full(layout.count, np.nan)
-    for name in POSITIONS:
-        if name in layout:
-            lags[layout[name].start + _meshes(assembly)] = 0.0
-    connectors = assembly.with_linear_supports().connectors
-    stiffness = connectors.stiffness
-    damping = connectors.damping
-    # The ratio where damping is in proportion to stiffness, and its mean where a file gives both.
-    sizes = np.maximum((stiffness**2).sum(axis=(1, 2)), np.finfo(np.float64).tiny)
-    times = np.maximum((stiffness * damping).sum(axis=(1, 2)) / sizes, 0.0)
-    for name in FORCES if len(times) else ():
-        lags[layout[name]] = np.repeat(times / step, len(AXES))
-    return lags
 
 
 def _remedy(method: Method, lag: float, half: int) -> Floats:

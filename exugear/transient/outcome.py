@@ -308,21 +308,18 @@ class ValidityMonitor:
         """
         # A run that diverges passes through numbers whose sums overflow: infinite or not a number, they are too large.
         with np.errstate(over="ignore", invalid="ignore"):
-            self._see_energy(account_times, account)
+            start, scale = self.figures[ACCOUNT, [AT_START, SCALE]]
+            if np.isnan(start):
+                start = account[0, KINETIC] + account[0, ELASTIC]
+                scale = 0.0
+            left, scales = energy_left_over(account, start, scale)
+            self.figures[ACCOUNT, [AT_START, SCALE]] = start, scales[-1]
+            self._keep(ENERGY, account_times, left[None], 0.0, np.ones(1), self.limits.energy_marked)
             spins = v.T[self._spins]
             self._keep(RIM, times, spins, 0.0, self._radii, self.limits.rim_speed_stopped)
             self._keep(SPEED, times, spins, 0.0, self._radii / self._allowed, 1.0)
             given_way = np.ascontiguousarray(deflections.T)
             self._keep(DEFLECTION, times, given_way, self._gaps, 1.0 / self._heights, self.limits.deflection_marked)
-
-    def _see_energy(self, times: Floats, lines: Floats) -> None:
-        start, scale = self.figures[ACCOUNT, [AT_START, SCALE]]
-        if np.isnan(start):
-            start = lines[0, KINETIC] + lines[0, ELASTIC]
-            scale = 0.0
-        left, scales = energy_left_over(lines, start, scale)
-        self.figures[ACCOUNT, [AT_START, SCALE]] = start, scales[-1]
-        self._keep(ENERGY, times, left[None], 0.0, np.ones(1), self.limits.energy_marked)
 
     def _keep(
         self, row: int, times: Floats, values: Floats, gaps: Floats | float, scales: Floats, limit: float

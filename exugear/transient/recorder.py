@@ -294,16 +294,8 @@ class Recorder:
         numbers = centre + self._decimator.factor * np.arange(len(samples), dtype=np.float64)
         end = float(times[-1])
         self._note_validity(against + self._reasons(end))
-        state = self._checkpoint(end, rows, past)
-        pieces = self._start.pieces
-        self._file.add(pieces.append(self._plan.step * numbers, samples, times[written], balances, state))
-        buffer.clear()
-        return end
-
-    def _checkpoint(self, time: float, rows: RowBuffer, past: Floats) -> RunCheckpoint:
-        """Restart state: the last of these rows, at a time (s)."""
-        return RunCheckpoint(
-            step=round(time / self._plan.step),
+        state = RunCheckpoint(
+            step=round(end / self._plan.step),
             q=rows.q[-1],
             v=rows.v[-1],
             past=past,
@@ -315,6 +307,10 @@ class Recorder:
             mesh_times=self._mesh_times,
             judgement=self._judge.figures,
         )
+        pieces = self._start.pieces
+        self._file.add(pieces.append(self._plan.step * numbers, samples, times[written], balances, state))
+        buffer.clear()
+        return end
 
     def reasons(self) -> tuple[str, ...]:
         """Return the reasons why the run is invalid so far."""

@@ -32,7 +32,7 @@ from exugear.transient.compiled.solver import CompiledSystem, unsupported_reason
 from exugear.transient.outcome import LimitError, Progress, ProgressMeter, Run, RunError
 from exugear.transient.plan import SAMPLE_RATE, RunPlan, check_disk, check_duration, plan_run, too_fine
 from exugear.transient.recorder import Recorder
-from exugear.transient.start import RunStart, held, kept_duration, prepare_start
+from exugear.transient.start import RunStart, held, kept_setting, prepare_start
 from fe_ste.tools.arrays import Floats
 
 if TYPE_CHECKING:
@@ -236,7 +236,7 @@ def simulate(
     case = gearbox.load_cases[choice.load_case]
     directory = run_directory(out, choice)
     if resume and duration is None:
-        duration = kept_duration(directory)
+        duration = kept_setting(directory, "duration")
     check_duration(gearbox, case, duration, sample_rate)
 
     assembly = assemble(gearbox, choice, stiffness, bodies, angles=angles)
@@ -255,38 +255,28 @@ def simulate(
         if not resume:
             size = signal_layout(assembly).sample_bytes
             check_disk(gearbox, case, directory, total, sample_rate, sample_bytes=size)
-        return _carry_out(plan, prepare_start(plan, resume), progress)
-
-
-def _carry_out(plan: RunPlan, start: RunStart, progress: Callable[[Progress], None] | None) -> Run:
-    """Integrate to the end, or to the first error or interruption, and keep the file of a complete run."""
-    with RunFile(plan.final_path, start.pieces, plan.samples) as file:
-        meter = ProgressMeter(start.state.step * plan.step, plan.duration, progress)
-        run = _integrate(plan, start, file, meter)
-        if run.complete:
-            meter.reach(run.end)
-            start.pieces.note("complete", 1)
-            file.finish()
-    return run
-
-
-def _integrate(plan: RunPlan, start: RunStart, file: RunFile, meter: ProgressMeter) -> Run:
-    """Integrate and return the run; an error, or a limit that was passed, is raised."""
-    with Recorder(plan, start, file, meter.reach) as recorder, interruptible() as interruption:
-        integrate(plan, start, recorder, interruption)
-        recorder.finish()
-        if recorder.error:
-            recorder.note_validity()
-            start.pieces.mark()
-    reasons = recorder.reasons()
-    if recorder.error:
-        raise RunError(f"{'; '.join((recorder.error, *reasons))}; results so far: {plan.partial_path}")
-    complete = not interruption.asked and not recorder.halted
-    path = plan.final_path if complete else plan.partial_path
-    run = Run(path, complete, recorder.last_time, meter.wall, reasons, recorder.halted)
-    if run.halted:
-        raise LimitError(f"{'; '.join(reasons)}; results so far: {plan.partial_path}", run)
-    return run
+        start = prepare_start(plan, resume)
+        with RunFile(plan.final_path, start.pieces, plan.samples) as file:
+            meter = ProgressMeter(start.state.step * plan.step, plan.duration, progress)
+            with Recorder(plan, start, file, meter.reach) as recorder, interruptible() as interruption:
+                integrate(plan, start, recorder, interruption)
+                recorder.finish()
+                if recorder.error:
+                    recorder.note_validity()
+                    start.pieces.mark()
+            reasons = recorder.reasons()
+            if recorder.error:
+                raise RunError(f"{'; '.join((recorder.error, *reasons))}; results so far: {plan.partial_path}")
+            complete = not interruption.asked and not recorder.halted
+            path = plan.final_path if complete else plan.partial_path
+            run = Run(path, complete, recorder.last_time, meter.wall, reasons, recorder.halted)
+            if run.halted:
+                raise LimitError(f"{'; '.join(reasons)}; results so far: {plan.partial_path}", run)
+            if run.complete:
+                meter.reach(run.end)
+                start.pieces.note("complete", 1)
+                file.finish()
+        return run
 
 
 def _solver(asked: str | None, assembly: Assembly, mesh_route: str) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -79,15 +80,9 @@ def refuse_to_resume(directory: Path) -> str:
     return f"{directory}: no interrupted run with these settings"
 
 
-def kept_duration(directory: Path) -> float | None:
-    """Read how long a stopped run was to be, s; None where that is not kept."""
-    kept = kept_attributes(directory / PARTIAL_NAME).get("duration")
-    return kept and float(kept)
-
-
-def kept_band(directory: Path) -> float | None:
-    """Read the band that a stopped run keeps, Hz; None where that is not kept."""
-    kept = kept_attributes(directory / PARTIAL_NAME).get("band")
+def kept_setting(directory: Path, name: Literal["duration", "band"]) -> float | None:
+    """Read how long a stopped run was to be (s), or the band that it keeps (Hz); None where that is not kept."""
+    kept = kept_attributes(directory / PARTIAL_NAME).get(name)
     return kept and float(kept)
 
 
@@ -135,7 +130,18 @@ def prepare_start(plan: RunPlan, resume: bool) -> RunStart:
     judge = ValidityMonitor(assembly, summary)
     layout = signal_layout(assembly)
     if resume:
-        pieces = _pieces_to_resume(plan, layout)
+        reason = refuse_to_resume(plan.directory)
+        if reason:
+            raise RunError(f"{reason}; run without resuming")
+        if shorter := refuse_shorter(plan.directory, plan.duration):
+            raise RunError(f"{shorter}; set a longer duration")
+        pieces = RunPieces(plan.partial_path, layout)
+        for key, value in plan.attributes().items():
+            kept = pieces.attributes.get(key, "element" if key == "mesh_route" else None)  # earlier runs had no other
+            if key not in ("complete", "solver", *EXPECTATIONS) and kept != value:
+                raise RunError(
+                    f"{plan.partial_path}: was run with {key} = {kept}, not {value}; run it again without --resume"
+                )
         pieces.note("duration", plan.duration)
         state = pieces.last_checkpoint()
         judge.figures = state.judgement
@@ -153,22 +159,6 @@ def prepare_start(plan: RunPlan, resume: bool) -> RunStart:
         told = {**doubts, "load": load, "duration": plan.duration}
         pieces = RunPieces(plan.partial_path, layout, {**plan.attributes(), **told})
     return RunStart(_load_table(case, series, state.start_angle, assembly), state, pieces, judge, resume)
-
-
-def _pieces_to_resume(plan: RunPlan, layout: SignalLayout) -> RunPieces:
-    reason = refuse_to_resume(plan.directory)
-    if reason:
-        raise RunError(f"{reason}; run without resuming")
-    if shorter := refuse_shorter(plan.directory, plan.duration):
-        raise RunError(f"{shorter}; set a longer duration")
-    pieces = RunPieces(plan.partial_path, layout)
-    for key, value in plan.attributes().items():
-        kept = pieces.attributes.get(key, "element" if key == "mesh_route" else None)  # earlier runs had no other
-        if key not in ("complete", "solver", *EXPECTATIONS) and kept != value:
-            raise RunError(
-                f"{plan.partial_path}: was run with {key} = {kept}, not {value}; run it again without --resume"
-            )
-    return pieces
 
 
 def _first_state(

@@ -166,6 +166,17 @@ def circle_limit(pair: FlankPair, radius: float, axial: float, tooth: int, rotat
     return 0.5 * (low + high)
 
 
+def pinion_flank_points(pair: GearPair, roll: Floats, tooth: Integers, axial: Floats, rotation: float) -> Floats:
+    """Points (..., 3) on the flanks of gear 1, m, from its axis; arguments as of `rigid_gap`, which broadcast."""
+    pinion = pair.pinion
+    working = pair.working_pressure_angle
+    twist = math.tan(pinion.base_helix_angle) / pinion.base_radius
+    turned = rotation + tooth * pinion.angular_pitch + twist * axial
+    polar = (math.tan(working) - working) - (roll - np.arctan(roll)) + turned
+    radius = pinion.base_radius * np.sqrt(1.0 + roll**2)
+    return np.stack([radius * np.cos(polar), radius * np.sin(polar), np.broadcast_to(axial, radius.shape)], axis=-1)
+
+
 #: A cell cut by a tip edge to less than this part of its width is joined to its neighbour: so narrow a cell would
 #: have a pressure of its own that is all rounding.
 _LEAST_CELL = 0.2

@@ -404,20 +404,16 @@ def end_errors(mesh: SectorMesh, side: int, images: Floats, incompatible_modes: 
         error = _Row(mesh, side, end, _LAYERS, incompatible_modes).error(loaded, of_end)[:, :END_LAYERS]
         # The layers of the inner row run from the upper end downwards.
         error -= known[:, middle + end * (loaded[:, None] - loaded)]
-        errors.append(_inverse_transform(error))
+        # From wave numbers to the distance in nodes from the load.
+        away = np.arange(1 - WAVES, WAVES)
+        waves = np.exp(1j * _wave_numbers()[:, None] * away) / WAVES
+        errors.append(np.asarray(np.einsum("krl,kj->jrl", error, waves).real))
     return errors[0], errors[1]
 
 
 def _wave_numbers() -> Floats:
     """Phases per node along the profile: offset from zero by half a step, because the far field is not needed."""
     return np.asarray((np.arange(WAVES) + 0.5) * np.pi / WAVES)
-
-
-def _inverse_transform(transform: Floats) -> Floats:
-    """Transform from wave numbers to the distance in nodes from the load."""
-    away = np.arange(1 - WAVES, WAVES)
-    waves = np.exp(1j * _wave_numbers()[:, None] * away) / WAVES
-    return np.asarray(np.einsum("krl,kj->jrl", transform, waves).real)
 
 
 class _Row:

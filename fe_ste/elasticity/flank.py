@@ -159,48 +159,37 @@ def flank_compliance(
     if open_teeth is not None and not (1 <= open_teeth <= gear.teeth and open_teeth % 2 == 1):
         raise ValueError(f"open_teeth = {open_teeth}: must be an odd number from 1 to {gear.teeth}")
     with one_dense_thread():
-        return _flank_compliance(gear, side, settings, open_teeth, tooth_reach, incompatible_modes)
-
-
-def _flank_compliance(
-    gear: Gear,
-    side: int,
-    settings: MeshSettings | None,
-    open_teeth: int | None,
-    tooth_reach: int,
-    incompatible_modes: bool,
-) -> FlankCompliance:
-    mesh = sector_mesh(gear, settings)
-    images = flank_images(gear, side)
-    sector, near = both(
-        lambda: CondensedSector.from_mesh(mesh, side, incompatible_modes),
-        lambda: flank_near_field(mesh, side, images, incompatible_modes),
-    )
-    if open_teeth is None:
-        faces = sector.ring_faces(gear.teeth, min(tooth_reach, (gear.teeth - 2) // 2))
-        torque = sector.ring_torque()
-    else:
-        faces, torque = sector.open_faces(open_teeth)
-    regular = {}
-    for (read, loaded), cut_faces in faces.items():
-        regular[read, loaded] = sector.displacement(read == loaded, *cut_faces)
-        if read == loaded:
-            regular[read, loaded] = regular_part(mesh, regular[read, loaded], near)
-    return FlankCompliance(
-        gear=gear,
-        side=side,
-        images=images,
-        roll=mesh.section.flank_roll,
-        axial=mesh.axial_positions,
-        regular=regular,
-        closed=open_teeth is None,
-        hub_torque=torque,
-        figures={
-            "unknowns": 3 * len(mesh.points),
-            "elements": len(mesh.hexahedra),
-            "least_scaled_jacobian": float(mesh.scaled_jacobian.min()),
-        },
-    )
+        mesh = sector_mesh(gear, settings)
+        images = flank_images(gear, side)
+        sector, near = both(
+            lambda: CondensedSector.from_mesh(mesh, side, incompatible_modes),
+            lambda: flank_near_field(mesh, side, images, incompatible_modes),
+        )
+        if open_teeth is None:
+            faces = sector.ring_faces(gear.teeth, min(tooth_reach, (gear.teeth - 2) // 2))
+            torque = sector.ring_torque()
+        else:
+            faces, torque = sector.open_faces(open_teeth)
+        regular = {}
+        for (read, loaded), cut_faces in faces.items():
+            regular[read, loaded] = sector.displacement(read == loaded, *cut_faces)
+            if read == loaded:
+                regular[read, loaded] = regular_part(mesh, regular[read, loaded], near)
+        return FlankCompliance(
+            gear=gear,
+            side=side,
+            images=images,
+            roll=mesh.section.flank_roll,
+            axial=mesh.axial_positions,
+            regular=regular,
+            closed=open_teeth is None,
+            hub_torque=torque,
+            figures={
+                "unknowns": 3 * len(mesh.points),
+                "elements": len(mesh.hexahedra),
+                "least_scaled_jacobian": float(mesh.scaled_jacobian.min()),
+            },
+        )
 
 
 def regular_part(mesh: SectorMesh, displacement: Floats, near: Floats) -> Floats:

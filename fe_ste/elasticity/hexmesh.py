@@ -258,7 +258,16 @@ def _section_mesh(
     across_fractions: Floats,
 ) -> SectionMesh:
     flank_roll, upper, lower = _half_boundary(gear, profile, settings, flank_fractions)
-    core = _core_block(gear, upper, across_fractions)
+    # Nodes of the tooth core, from the minus to the plus flank, root to tip.
+    minus_edge = upper * np.array([1.0, -1.0])
+    step = np.hypot(*np.diff(upper, axis=0).T)
+    along = np.concatenate([[0.0], np.cumsum(step)]) / step.sum()
+    bottom = minus_edge[0] + across_fractions[:, None] * (upper[0] - minus_edge[0])
+    tip_radius = np.hypot(*upper[-1])
+    tip_angle = np.arctan2(upper[-1, 1], upper[-1, 0])
+    angle = (2.0 * across_fractions - 1.0) * tip_angle
+    top = tip_radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    core = _coons(minus_edge, upper, bottom, top, across_fractions, along)
     rim_centre, rim_plus = _rim_blocks(gear, core, upper[0], lower, settings)
     rim_minus = rim_plus[::-1] * np.array([1.0, -1.0])
 
@@ -311,19 +320,6 @@ def _half_boundary(
 
 def _point_along(curve: Floats, length: Floats, arc: Floats) -> Floats:
     return np.stack([np.interp(arc, length, curve[:, 0]), np.interp(arc, length, curve[:, 1])], axis=-1)
-
-
-def _core_block(gear: Gear, plus_edge: Floats, across: Floats) -> Floats:
-    """Nodes (thickness + 1, fillet + flank + 1, 2) of the tooth core, from the minus to the plus flank, root to tip."""
-    minus_edge = plus_edge * np.array([1.0, -1.0])
-    step = np.hypot(*np.diff(plus_edge, axis=0).T)
-    along = np.concatenate([[0.0], np.cumsum(step)]) / step.sum()
-    bottom = minus_edge[0] + across[:, None] * (plus_edge[0] - minus_edge[0])
-    tip_radius = np.hypot(*plus_edge[-1])
-    tip_angle = np.arctan2(plus_edge[-1, 1], plus_edge[-1, 0])
-    angle = (2.0 * across - 1.0) * tip_angle
-    top = tip_radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    return _coons(minus_edge, plus_edge, bottom, top, across, along)
 
 
 def _rim_blocks(gear: Gear, core: Floats, split: Floats, root: Floats, settings: MeshSettings) -> tuple[Floats, Floats]:

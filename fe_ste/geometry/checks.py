@@ -52,7 +52,17 @@ def check_gear(gear: GearInputs) -> None:
         With one message that says what would be right.
     """
     _check_values(gear)
-    _check_circles(gear)
+    if not 0.0 < gear.reference_half_angle < 0.5 * gear.angular_pitch:
+        what = "tooth" if gear.reference_half_angle <= 0.0 else "tooth space"
+        value = f"{gear.profile_shift:g} with tooth_thinning = {_mm(gear.tooth_thinning)}"
+        remedy = f"leaves no {what} at the reference circle: values nearer to zero are needed"
+        raise _refuse_gear(gear, "profile_shift", value, remedy)
+    tip = gear.tip_radius
+    root = gear.root_radius
+    if min(tip, root) <= 0.0 or (tip - root) * gear.outward <= 0.0:
+        word = "below" if gear.internal else "above"
+        remedy = f"must lie {word} the root diameter of {_mm(2.0 * root)}, and both above zero"
+        raise _refuse_gear(gear, "tip_diameter", _mm(2.0 * tip), remedy)
     if gear.cutter is not None:
         _check_cutter(gear, gear.cutter)
     elif gear.internal:
@@ -61,8 +71,19 @@ def check_gear(gear: GearInputs) -> None:
         _check_generating_rack(gear)
         _check_flank(gear)
     _check_form_circles(gear)
-    _check_tip_thickness(gear)
-    _check_held_diameter(gear)
+    thickness = gear.tip_thickness / gear.normal_module
+    if thickness < LEAST_TIP_THICKNESS:
+        word = "larger" if gear.internal else "smaller"
+        remedy = (
+            f"at profile_shift = {gear.profile_shift:g} leaves a tip {thickness:.4f} normal modules thick: "
+            f"at least {LEAST_TIP_THICKNESS} is needed, for instance by a {word} tip_diameter"
+        )
+        raise _refuse_gear(gear, "tip_diameter", _mm(2.0 * gear.tip_radius), remedy)
+    root = 2.0 * gear.root_radius
+    if (root - gear.held_diameter) * gear.outward <= 0.0:
+        word = "above" if gear.internal else "below"
+        remedy = f"must lie {word} the root diameter of {_mm(root)}"
+        raise _refuse_gear(gear, "held_diameter", _mm(gear.held_diameter), remedy)
 
 
 def check_gear_pair(pair: UncheckedPair) -> None:
@@ -77,18 +98,53 @@ def check_gear_pair(pair: UncheckedPair) -> None:
     GeometryError
         With one message that says what would be right.
     """
-    _check_teeth_of_mates(pair)
+    pinion = pair.pinion
+    gear = pair.gear
+    if pinion.internal:
+        remedy = "is an internal gear: the external gear of the pair must be the pinion"
+        raise _refuse_pair(pair, "pinion", f"'{pinion.name}'", remedy)
+    least = pinion.teeth + 1 if gear.internal else pinion.teeth
+    if gear.teeth < least:
+        remedy = f"must be at least {least}: the pinion, '{pinion.name}' with {pinion.teeth}, is the smaller"
+        raise _refuse_pair(pair, f"teeth of '{gear.name}'", f"{gear.teeth}", remedy)
     _check_common_face(pair)
-    _check_equal_rack(pair)
-    _check_hands(pair)
-    _check_centre_distance(pair)
+    if not math.isclose(pinion.normal_module, gear.normal_module, rel_tol=LENGTH_TOLERANCE):
+        remedy = f"must equal that of '{pinion.name}', {_mm(pinion.normal_module)}"
+        raise _refuse_pair(pair, f"normal_module of '{gear.name}'", _mm(gear.normal_module), remedy)
+    if not math.isclose(pinion.normal_pressure_angle, gear.normal_pressure_angle, rel_tol=LENGTH_TOLERANCE):
+        remedy = f"must equal that of '{pinion.name}', {_deg(pinion.normal_pressure_angle)}"
+        value = _deg(gear.normal_pressure_angle)
+        raise _refuse_pair(pair, f"normal_pressure_angle of '{gear.name}'", value, remedy)
+    needed = -gear.outward * pinion.helix_angle
+    if not math.isclose(gear.helix_angle, needed, rel_tol=LENGTH_TOLERANCE, abs_tol=LENGTH_TOLERANCE):
+        kind = "same hand" if gear.internal else "opposite hand"
+        remedy = (
+            f"does not mate with {_deg(pinion.helix_angle)} of '{pinion.name}': an "
+            f"{'internal' if gear.internal else 'external'} pair needs the {kind}, {_deg(needed)}"
+        )
+        raise _refuse_pair(pair, f"helix_angle of '{gear.name}'", _deg(gear.helix_angle), remedy)
+    if not _is_number(pair.centre_distance) or pair.centre_distance <= 0.0:
+        remedy = "must be a finite number above zero, also for an internal pair"
+        raise _refuse_pair(pair, "centre_distance", f"{pair.centre_distance!r}", remedy)
+    touching = abs(pinion.base_radius + gear.outward * gear.base_radius)
+    if pair.centre_distance <= touching:
+        distance = pair.centre_distance
+        remedy = f"is too small: no line of action touches both base circles below {_mm(touching, distance)}"
+        raise _refuse_pair(pair, "centre_distance", _mm(distance, touching), remedy)
     _check_backlash(pair)
     _check_tip_clearances(pair)
     _check_tip_interference(pair)
     _check_contact(pair)
     _check_fillet_clearance(pair)
     if pair.gear.internal:
-        _check_tips_pass(pair)
+        swallowed = pair.pinion.tip_radius >= pair.centre_distance + pair.gear.tip_radius
+        if swallowed or internal_tip_gap(pair) < 0.0:
+            difference = pair.gear.teeth - pair.pinion.teeth
+            remedy = (
+                f"is too small: outside the path of contact the tips of '{pair.pinion.name}' and "
+                f"'{pair.gear.name}' collide; more difference in teeth or shorter teeth are needed"
+            )
+            raise _refuse_pair(pair, "difference in teeth", f"{difference}", remedy)
 
 
 def _refuse_gear(gear: GearInputs, key: str, value: str, remedy: str) -> GeometryError:
@@ -149,10 +205,6 @@ def _check_values(gear: GearInputs) -> None:
             raise _refuse_gear(gear, key, f"{value!r}", "must be a finite number, zero or above (SI units)")
     if not _is_number(gear.profile_shift):
         raise _refuse_gear(gear, "profile_shift", f"{gear.profile_shift!r}", "must be a finite number")
-    _check_ranges(gear)
-
-
-def _check_ranges(gear: GearInputs) -> None:
     least, most = PRESSURE_ANGLE_RANGE
     angle = gear.normal_pressure_angle
     if not _is_number(angle) or not least <= angle <= most:
@@ -166,21 +218,6 @@ def _check_ranges(gear: GearInputs) -> None:
     ratio = gear.material.poissons_ratio
     if not _is_number(ratio) or not 0.0 <= ratio < 0.5:
         raise _refuse_gear(gear, "material.poissons_ratio", f"{ratio!r}", "must be at least 0 and below 0.5")
-
-
-def _check_circles(gear: GearInputs) -> None:
-    """Refuse teeth or spaces of no width at the reference circle, and tips that are not beyond the root."""
-    if not 0.0 < gear.reference_half_angle < 0.5 * gear.angular_pitch:
-        what = "tooth" if gear.reference_half_angle <= 0.0 else "tooth space"
-        value = f"{gear.profile_shift:g} with tooth_thinning = {_mm(gear.tooth_thinning)}"
-        remedy = f"leaves no {what} at the reference circle: values nearer to zero are needed"
-        raise _refuse_gear(gear, "profile_shift", value, remedy)
-    tip = gear.tip_radius
-    root = gear.root_radius
-    if min(tip, root) <= 0.0 or (tip - root) * gear.outward <= 0.0:
-        word = "below" if gear.internal else "above"
-        remedy = f"must lie {word} the root diameter of {_mm(2.0 * root)}, and both above zero"
-        raise _refuse_gear(gear, "tip_diameter", _mm(2.0 * tip), remedy)
 
 
 def _check_generating_rack(gear: GearInputs) -> None:
@@ -199,7 +236,7 @@ def _check_generating_rack(gear: GearInputs) -> None:
 def _check_flank(gear: GearInputs) -> None:
     """Refuse a tooth that its root, undercut or not, leaves no flank, and one that undercut leaves too thin a neck."""
     if gear.is_undercut:
-        neck = _neck_thickness(gear) / gear.normal_module
+        neck = 2.0 * float(np.min(np.abs(root_fillet(gear, np.linspace(0.0, 1.0, 201))[:, 1]))) / gear.normal_module
         if neck < LEAST_NECK_THICKNESS:
             least = gear.profile_shift - gear.generated_roll_length / gear.normal_module * math.sin(
                 gear.transverse_pressure_angle
@@ -212,11 +249,6 @@ def _check_flank(gear: GearInputs) -> None:
     if gear.tip_radius <= gear.form_radius:
         remedy = f"leaves no involute: it must lie above the form diameter of {_mm(2.0 * gear.form_radius)}"
         raise _refuse_gear(gear, "tip_diameter", _mm(2.0 * gear.tip_radius), remedy)
-
-
-def _neck_thickness(gear: GearInputs) -> float:
-    """Minimum thickness of an external tooth below its flank, transverse section, m."""
-    return 2.0 * float(np.min(np.abs(root_fillet(gear, np.linspace(0.0, 1.0, 201))[:, 1])))
 
 
 def _check_form_circles(gear: GearInputs) -> None:
@@ -258,7 +290,10 @@ def _check_cutter(gear: GearInputs, cutter: PinionCutter) -> None:
         remedy = "says the root diameter, too: leave it or root_diameter out"
         raise _refuse_gear(gear, "cutter.tip_diameter", _mm(cutter.tip_diameter), remedy)
     _check_cutter_tooth(gear, cutter)
-    _check_flank_of_ring(gear)
+    _check_tip_outside_base(gear)
+    if gear.form_radius <= gear.tip_radius:
+        remedy = f"leaves no involute: it must lie below the form diameter of {_mm(2.0 * gear.form_radius)}"
+        raise _refuse_gear(gear, "tip_diameter", _mm(2.0 * gear.tip_radius), remedy)
     _check_trimmed_tips(gear)
 
 
@@ -276,14 +311,6 @@ def _check_cutter_tooth(gear: GearInputs, cutter: PinionCutter) -> None:
     if cut.rounding > cut.largest_rounding + LENGTH_TOLERANCE * module:
         remedy = f"does not fit on the cutter's tip: at most {cut.largest_rounding / module:.4f}, a full round"
         raise _refuse_gear(gear, "cutter.tip_radius", f"{cutter.tip_radius:g}", remedy)
-
-
-def _check_flank_of_ring(gear: GearInputs) -> None:
-    """Refuse tips inside the base circle, and a cutter that leaves no involute."""
-    _check_tip_outside_base(gear)
-    if gear.form_radius <= gear.tip_radius:
-        remedy = f"leaves no involute: it must lie below the form diameter of {_mm(2.0 * gear.form_radius)}"
-        raise _refuse_gear(gear, "tip_diameter", _mm(2.0 * gear.tip_radius), remedy)
 
 
 def _check_trimmed_tips(gear: GearInputs) -> None:
@@ -323,37 +350,6 @@ def _check_internal_space(gear: GearInputs) -> None:
         raise _refuse_gear(gear, "rack.tip_radius", f"{gear.rack.tip_radius:g}", remedy)
 
 
-def _check_tip_thickness(gear: GearInputs) -> None:
-    thickness = gear.tip_thickness / gear.normal_module
-    if thickness < LEAST_TIP_THICKNESS:
-        word = "larger" if gear.internal else "smaller"
-        remedy = (
-            f"at profile_shift = {gear.profile_shift:g} leaves a tip {thickness:.4f} normal modules thick: "
-            f"at least {LEAST_TIP_THICKNESS} is needed, for instance by a {word} tip_diameter"
-        )
-        raise _refuse_gear(gear, "tip_diameter", _mm(2.0 * gear.tip_radius), remedy)
-
-
-def _check_held_diameter(gear: GearInputs) -> None:
-    root = 2.0 * gear.root_radius
-    if (root - gear.held_diameter) * gear.outward <= 0.0:
-        word = "above" if gear.internal else "below"
-        remedy = f"must lie {word} the root diameter of {_mm(root)}"
-        raise _refuse_gear(gear, "held_diameter", _mm(gear.held_diameter), remedy)
-
-
-def _check_teeth_of_mates(pair: UncheckedPair) -> None:
-    pinion = pair.pinion
-    gear = pair.gear
-    if pinion.internal:
-        remedy = "is an internal gear: the external gear of the pair must be the pinion"
-        raise _refuse_pair(pair, "pinion", f"'{pinion.name}'", remedy)
-    least = pinion.teeth + 1 if gear.internal else pinion.teeth
-    if gear.teeth < least:
-        remedy = f"must be at least {least}: the pinion, '{pinion.name}' with {pinion.teeth}, is the smaller"
-        raise _refuse_pair(pair, f"teeth of '{gear.name}'", f"{gear.teeth}", remedy)
-
-
 def _check_common_face(pair: UncheckedPair) -> None:
     width = pair.common_face_width
     most = min(pair.pinion.face_width, pair.gear.face_width)
@@ -364,41 +360,6 @@ def _check_common_face(pair: UncheckedPair) -> None:
         raise _refuse_pair(
             pair, "common_face_width", value, f"must be above zero and at most the narrower face, {_mm(most)}"
         )
-
-
-def _check_equal_rack(pair: UncheckedPair) -> None:
-    pinion = pair.pinion
-    gear = pair.gear
-    if not math.isclose(pinion.normal_module, gear.normal_module, rel_tol=LENGTH_TOLERANCE):
-        remedy = f"must equal that of '{pinion.name}', {_mm(pinion.normal_module)}"
-        raise _refuse_pair(pair, f"normal_module of '{gear.name}'", _mm(gear.normal_module), remedy)
-    if not math.isclose(pinion.normal_pressure_angle, gear.normal_pressure_angle, rel_tol=LENGTH_TOLERANCE):
-        remedy = f"must equal that of '{pinion.name}', {_deg(pinion.normal_pressure_angle)}"
-        value = _deg(gear.normal_pressure_angle)
-        raise _refuse_pair(pair, f"normal_pressure_angle of '{gear.name}'", value, remedy)
-
-
-def _check_hands(pair: UncheckedPair) -> None:
-    """Refuse mismatched hands: an external pair has opposite hands, an internal pair equal hands."""
-    needed = -pair.gear.outward * pair.pinion.helix_angle
-    if not math.isclose(pair.gear.helix_angle, needed, rel_tol=LENGTH_TOLERANCE, abs_tol=LENGTH_TOLERANCE):
-        kind = "same hand" if pair.gear.internal else "opposite hand"
-        remedy = (
-            f"does not mate with {_deg(pair.pinion.helix_angle)} of '{pair.pinion.name}': an "
-            f"{'internal' if pair.gear.internal else 'external'} pair needs the {kind}, {_deg(needed)}"
-        )
-        raise _refuse_pair(pair, f"helix_angle of '{pair.gear.name}'", _deg(pair.gear.helix_angle), remedy)
-
-
-def _check_centre_distance(pair: UncheckedPair) -> None:
-    if not _is_number(pair.centre_distance) or pair.centre_distance <= 0.0:
-        remedy = "must be a finite number above zero, also for an internal pair"
-        raise _refuse_pair(pair, "centre_distance", f"{pair.centre_distance!r}", remedy)
-    least = abs(pair.pinion.base_radius + pair.gear.outward * pair.gear.base_radius)
-    if pair.centre_distance <= least:
-        distance = pair.centre_distance
-        remedy = f"is too small: no line of action touches both base circles below {_mm(least, distance)}"
-        raise _refuse_pair(pair, "centre_distance", _mm(distance, least), remedy)
 
 
 def _check_backlash(pair: UncheckedPair) -> None:
@@ -488,18 +449,6 @@ def _check_fillet_clearance(pair: UncheckedPair) -> None:
                 f"a {word} one{would_do}, or a smaller {tool}.tip_radius of '{mate.name}', is needed"
             )
             raise _refuse_pair(pair, f"tip_diameter of '{tip.name}'", _mm(2.0 * tip.tip_radius), remedy)
-
-
-def _check_tips_pass(pair: UncheckedPair) -> None:
-    """Refuse an internal pair whose tips collide outside the path of contact, where the tip circles cross."""
-    swallowed = pair.pinion.tip_radius >= pair.centre_distance + pair.gear.tip_radius
-    if swallowed or internal_tip_gap(pair) < 0.0:
-        difference = pair.gear.teeth - pair.pinion.teeth
-        remedy = (
-            f"is too small: outside the path of contact the tips of '{pair.pinion.name}' and "
-            f"'{pair.gear.name}' collide; more difference in teeth or shorter teeth are needed"
-        )
-        raise _refuse_pair(pair, "difference in teeth", f"{difference}", remedy)
 
 
 def internal_tip_gap(pair: UncheckedPair) -> float:

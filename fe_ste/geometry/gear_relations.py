@@ -431,11 +431,7 @@ def root_fillet(gear: GearInputs, parameter: Floats) -> Floats:
         return cartesian(*gear.rack_tip_cut.polar(start + parameter * (1.0 - start)))
     if gear.cutter is not None:
         return cartesian(*gear.cutter_tip_cut.polar(parameter))
-    return _internal_fillet(gear, parameter)
-
-
-def _internal_fillet(gear: GearInputs, parameter: Floats) -> Floats:
-    """Arc that touches the flank (0) and the root circle (1) of an internal gear."""
+    # The arc that touches the flank (0) and the root circle (1) of an internal gear.
     radius = gear.fillet_radius
     centre_angle = gear.fillet_centre_angle
     centre = (gear.root_radius - radius) * np.array([math.cos(centre_angle), math.sin(centre_angle)])
@@ -443,8 +439,8 @@ def _internal_fillet(gear: GearInputs, parameter: Floats) -> Floats:
     # The normal of an involute is tangent to the base circle, hence at right angles to the base radius that
     # stands off by the profile angle.
     profile_angle = math.acos(gear.base_radius / gear.form_radius)
-    start = form_angle + profile_angle - 0.5 * math.pi
-    direction = start + parameter * (centre_angle - start)
+    begin = form_angle + profile_angle - 0.5 * math.pi
+    direction = begin + parameter * (centre_angle - begin)
     return centre + radius * np.column_stack((np.cos(direction), np.sin(direction)))
 
 

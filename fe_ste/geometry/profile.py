@@ -68,21 +68,17 @@ def tooth_profile(gear: Gear) -> ToothProfile:
     >>> round(float(1e3 * np.hypot(*profile.fillet[-1])), 6)
     71.25
     """
+    # Points of the fillet at nearly equal distances, end points exactly.
+    parameter = np.linspace(0.0, 1.0, _OVERSAMPLING * _FILLET_POINTS)
+    steps = np.diff(root_fillet(gear, parameter), axis=0)
+    length = np.concatenate(([0.0], np.cumsum(np.hypot(*steps.T))))
     return ToothProfile(
         gear=gear,
         tip_radius=gear.tip_radius,
         form_radius=gear.form_radius,
         root_radius=gear.root_radius,
-        fillet=_evenly_spaced_fillet(gear),
+        fillet=root_fillet(gear, np.interp(np.linspace(0.0, length[-1], _FILLET_POINTS), length, parameter)),
     )
-
-
-def _evenly_spaced_fillet(gear: Gear) -> Floats:
-    """Points of the fillet at nearly equal distances, end points exactly."""
-    parameter = np.linspace(0.0, 1.0, _OVERSAMPLING * _FILLET_POINTS)
-    steps = np.diff(root_fillet(gear, parameter), axis=0)
-    length = np.concatenate(([0.0], np.cumsum(np.hypot(*steps.T))))
-    return root_fillet(gear, np.interp(np.linspace(0.0, length[-1], _FILLET_POINTS), length, parameter))
 
 
 # Cubic splines through values at nodes, whose third derivative is continuous at the last but one ("not a knot")

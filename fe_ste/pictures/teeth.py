@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from fe_ste.contact.kinematics import pinion_flank_points
 from fe_ste.elasticity.gear_mesh import GearMesh, whole_ring
 from fe_ste.elasticity.hexmesh import MeshSettings, sector_mesh
 from fe_ste.geometry.gears import Gear, GearPair
@@ -273,24 +274,6 @@ def meshed_teeth(
     >>> bool(abs(from_axis.max() - gear.tip_radius) < 1e-9)
     True
     """
-    sides = _sides(pair)
-    return _teeth_of(pair.pinion, sides[0], rotation, teeth, settings), _teeth_of(
-        pair.gear, sides[1], rotation, teeth, settings
-    )
-
-
-@dataclass(frozen=True)
-class _Side:
-    """Position of a gear in a pair: polar angle of the middle of its tooth 0, pitch and the gear's own frame."""
-
-    start: float
-    pitch: float
-    ratio: float
-    centre: float
-    facing: float
-
-
-def _sides(pair: GearPair) -> tuple[_Side, _Side]:
     kind = -1.0 if pair.gear.internal else 1.0
     pinion = _Side(
         start=-float(pair.pinion.half_angle(pair.pinion_working_radius)),
@@ -307,7 +290,21 @@ def _sides(pair: GearPair) -> tuple[_Side, _Side]:
         centre=kind * pair.centre_distance,
         facing=-kind,
     )
-    return pinion, gear
+    return (
+        _teeth_of(pair.pinion, pinion, rotation, teeth, settings),
+        _teeth_of(pair.gear, gear, rotation, teeth, settings),
+    )
+
+
+@dataclass(frozen=True)
+class _Side:
+    """Position of a gear in a pair: polar angle of the middle of its tooth 0, pitch and the gear's own frame."""
+
+    start: float
+    pitch: float
+    ratio: float
+    centre: float
+    facing: float
 
 
 def _teeth_of(
@@ -343,21 +340,11 @@ def contact_quads(pair: GearPair, cells: Cells, rotation: float, axial: Floats, 
     -------
     (k, 4, 3) m, in the frame of `meshed_teeth`
     """
-    pinion = pair.pinion
     # Along the profile the arc of an involute grows by r_b tan(alpha) per roll angle.
-    half_roll = cells.half_across / (pinion.base_radius * cells.roll)
+    half_roll = cells.half_across / (pair.pinion.base_radius * cells.roll)
     roll = cells.roll[:, None] + half_roll[:, None] * np.array([-1.0, 1.0, 1.0, -1.0])
     height = axial[cells.layer][:, None] + 0.5 * slice_width * np.array([-1.0, -1.0, 1.0, 1.0])
-    working = math.tan(pair.working_pressure_angle)
-    twist = math.tan(pinion.base_helix_angle) / pinion.base_radius
-    polar = (
-        (working - math.atan(working))
-        - (roll - np.arctan(roll))
-        + (rotation + cells.tooth[:, None] * pinion.angular_pitch)
-        + twist * height
-    )
-    radius = pinion.base_radius * np.sqrt(1.0 + roll**2)
-    return np.stack([radius * np.cos(polar), radius * np.sin(polar), height], axis=-1)
+    return pinion_flank_points(pair, roll, cells.tooth[:, None], height, rotation)
 
 
 # Pictures of contact stress: the flank from the front and the section through the contact, rendered off-screen
@@ -416,7 +403,12 @@ def draw_contact_stress(
     name = (field.pair.pinion, field.pair.gear)[flank.number].name.replace("_", " ")
     load = f"{field.torque:.0f} N m on gear 1, position {field.pmc:.2f} of the mesh cycle, {field.method}"
     highest_point = flank.points[flank.highest] + flank.displacement[flank.highest]
-    top = 1e-6 * _top_stress(field, flank.points[flank.highest])
+    # The highest stress in the section, not the peaks at edges of other teeth.
+    points = np.concatenate([sector.points for sector in field.sectors])
+    apart = np.abs(points - flank.points[flank.highest])
+    shown = np.hypot(apart[:, 0], apart[:, 1]) < 0.5 * _SECTION_HEIGHT * field.pair.pinion.transverse_module
+    layer = apart[:, 2] <= max(float(apart[shown, 2].min()), 0.02 * field.pair.face_width)
+    top = 1e-6 * float(field.von_mises[shown & layer].max())
     views = (
         (f"flank of the {name} from the front", _flank_view(field, gear, flank, magnification, top, size)),
         (f"section at z = {1e3 * highest_point[2]:.1f} mm", _section_view(field, flank, highest_point, top, size)),
@@ -501,15 +493,6 @@ class _LoadedFlank:
             upward=upward / np.linalg.norm(upward),
             middle=middle,
         )
-
-
-def _top_stress(field: StressField, point: Floats) -> float:
-    """Upper end of the stress colours: the highest in the section, not the peaks at edges of other teeth."""
-    points = np.concatenate([sector.points for sector in field.sectors])
-    apart = np.abs(points - point)
-    shown = np.hypot(apart[:, 0], apart[:, 1]) < 0.5 * _SECTION_HEIGHT * field.pair.pinion.transverse_module
-    layer = apart[:, 2] <= max(float(apart[shown, 2].min()), 0.02 * field.pair.face_width)
-    return float(field.von_mises[shown & layer].max())
 
 
 def _grid(field: StressField, number: int, bricks: Integers, magnification: float) -> pyvista.UnstructuredGrid:

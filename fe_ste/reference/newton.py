@@ -327,9 +327,6 @@ class _EquilibriumSearch:
         self.history: list[Iteration] = []
         hub = self.model.hub
         self.largest_load = max(float(np.abs(self.model.forces).max()), abs(hub.force) if hub else 0.0)
-        self._check_start()
-
-    def _check_start(self) -> None:
         if not self.largest_load > 0.0:
             raise EquilibriumError("load step 1: there is no load")
         gap = self._facing_gap(self.at_rest)
@@ -505,7 +502,12 @@ class _EquilibriumSearch:
             current, length = self._line_search(current, active, step, pressure, load, where)
             tested = self._tested_active(current, active)
             changed = int(np.sum(tested != active))
-            row = self._row(current, active, load, iteration, changed, length)
+            largest = float(np.abs(current.state.displacement).max())
+            gap = float(np.abs(current.mean_gap[active]).max(initial=0.0))
+            force = float(np.abs(current.imbalance).max()) / (load * self.largest_load)
+            row = Iteration(
+                load, iteration, int(active.sum()), changed, length, force, gap / largest, current.state.hub
+            )
             self.history.append(row)
             if self.report is not None:
                 self.report(row)
@@ -530,14 +532,6 @@ class _EquilibriumSearch:
         if not tested.any():
             tested = now.mean_gap <= now.mean_gap.min() + self.model.reach
         return np.asarray(tested & np.isfinite(now.mean_gap))
-
-    def _row(
-        self, now: _Evaluation, active: Booleans, load: float, iteration: int, changed: int, length: float
-    ) -> Iteration:
-        largest = float(np.abs(now.state.displacement).max())
-        gap = float(np.abs(now.mean_gap[active]).max(initial=0.0))
-        force = float(np.abs(now.imbalance).max()) / (load * self.largest_load)
-        return Iteration(load, iteration, int(active.sum()), changed, length, force, gap / largest, now.state.hub)
 
     def _newton_step(self, now: _Evaluation, active: Booleans) -> tuple[Floats, Floats]:
         """Step of the unknowns and the pressures after it, from the linearised equilibrium with the gaps closed."""

@@ -18,7 +18,7 @@ from typing import TypeAlias
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fe_ste.contact.kinematics import Cells
+from fe_ste.contact.kinematics import Cells, pinion_flank_points
 from fe_ste.elasticity.gear_mesh import ContactMesh, GearMesh, refined_gears
 from fe_ste.flanks import FlankModification
 from fe_ste.geometry.gears import GearPair
@@ -166,7 +166,13 @@ def nonlinear_position(
     half_width = hertz_half_width(pair, normal_load(pair, torque) / least_contact_length(pair))
     sectors = refined_gears(pair, settings.mesh, pmc, half_width, settings.teeth, settings.closed)
     model = gear_model(pair, torque, sectors, settings.finite_deformation)
-    model = replace(model, clearance=_removed(pair, sectors, model, modifications))
+    # Material removed from both flanks at the nodes of the loaded flanks of gear 1.
+    x, y, z = model.bricks.points[model.first.nodes].T
+    removed = np.zeros(len(z))
+    for gear, mesh, modification in zip((pair.pinion, pair.gear), sectors, modifications, strict=True):
+        radius = np.clip(np.hypot(x - mesh.axis_x, y), *flank_radii(gear))
+        removed = removed + modification.gap(gear, radius, z)
+    model = replace(model, clearance=removed)
     try:
         equilibrium = solve_contact(model, settings.newton, report)
     except EquilibriumError as error:
@@ -236,18 +242,6 @@ def gear_model(
             if mesh.others is not None
         ),
     )
-
-
-def _removed(
-    pair: GearPair, meshes: tuple[GearMesh, GearMesh], model: ContactModel, modifications: Modifications
-) -> Floats:
-    """Material removed from both flanks at the nodes of the loaded flanks of gear 1, m."""
-    x, y, z = model.bricks.points[model.first.nodes].T
-    removed = np.zeros(len(z))
-    for gear, mesh, modification in zip((pair.pinion, pair.gear), meshes, modifications, strict=True):
-        radius = np.clip(np.hypot(x - mesh.axis_x, y), *flank_radii(gear))
-        removed = removed + modification.gap(gear, radius, z)
-    return removed
 
 
 def _load_share(sector: GearMesh, model: ContactModel, equilibrium: Equilibrium) -> dict[int, float]:
@@ -407,18 +401,12 @@ def _point_loads(
     pair: GearPair, cells: Cells, force: Floats, rotation: float, compliance: PairCompliance
 ) -> tuple[Floats, Floats]:
     """Points (p, 3) on the flanks of gear 1 and the forces (p,) at them."""
-    pinion = pair.pinion
     loaded = force > 0.0
     share = (np.arange(_POINTS_ACROSS) + 0.5) / _POINTS_ACROSS * 2.0 - 1.0
-    half_roll = (cells.half_across / (pinion.base_radius * cells.roll))[loaded]
+    half_roll = (cells.half_across / (pair.pinion.base_radius * cells.roll))[loaded]
     roll = cells.roll[loaded][:, None] + half_roll[:, None] * share
-    height = np.broadcast_to(compliance.axial[cells.layer][loaded][:, None], roll.shape)
-    working = pair.working_pressure_angle
-    twist = math.tan(pinion.base_helix_angle) / pinion.base_radius
-    turned = rotation + cells.tooth[loaded][:, None] * pinion.angular_pitch + twist * height
-    polar = (math.tan(working) - working) - (roll - np.arctan(roll)) + turned
-    radius = pinion.base_radius * np.sqrt(1.0 + roll**2)
-    load_points = np.stack([radius * np.cos(polar), radius * np.sin(polar), height], axis=-1)
+    axial = compliance.axial[cells.layer][loaded][:, None]
+    load_points = pinion_flank_points(pair, roll, cells.tooth[loaded][:, None], axial, rotation)
     return load_points.reshape(-1, 3), np.repeat(force[loaded] / _POINTS_ACROSS, _POINTS_ACROSS)
 
 

@@ -240,25 +240,22 @@ def pitch_running_in(deviation: float, hardening: Hardening, limit: float, veloc
     """
     if hardening == "case_hardened":
         return min(0.075 * deviation, 3e-6)
-    if velocity <= 5.0:
-        most = math.inf
-    elif velocity <= 10.0:
-        most = 12800.0
-    else:
-        most = 6400.0
+    most = _most_running_in(velocity)
     return min(160e6 / limit * deviation, 1e-6 * most * 1e6 / limit, deviation)
+
+
+def _most_running_in(velocity: float) -> float:
+    """Limit of y_alpha of through-hardened flanks at a velocity of the pitch line (m/s), um MPa."""
+    if velocity <= 5.0:
+        return math.inf
+    return 12800.0 if velocity <= 10.0 else 6400.0
 
 
 def helix_running_in(misalignment: float, hardening: Hardening, limit: float, velocity: float) -> float:
     """y_beta: what running in takes from the equivalent misalignment F_beta_x, m (ISO 6336-1, 7.5)."""
     if hardening == "case_hardened":
         return min(0.15 * misalignment, 6e-6)
-    if velocity <= 5.0:
-        most = math.inf
-    elif velocity <= 10.0:
-        most = 25600.0
-    else:
-        most = 12800.0
+    most = 2.0 * _most_running_in(velocity)
     return min(320e6 / limit * misalignment, 1e-6 * most * 1e6 / limit, misalignment)
 
 

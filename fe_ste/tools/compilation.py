@@ -102,7 +102,10 @@ def kernel_folder() -> Path | None:
             folder.mkdir(parents=True, exist_ok=True)
             tempfile.TemporaryFile(dir=folder).close()
             os.utime(folder)
-            _prune(place)
+            with suppress(FileNotFoundError):  # another process was faster
+                by_use = sorted(place.glob(_FOLDER + "*"), key=lambda old: old.stat().st_mtime, reverse=True)
+                for old in by_use[1 + _FOLDERS_KEPT :]:
+                    shutil.rmtree(old, ignore_errors=True)
             return folder
     _log.warning("No folder for compiled kernels can be written; they are compiled at each start")
     return None
@@ -184,11 +187,3 @@ def _digest() -> str:
         if __name__.encode() in source or file == Path(__file__):
             digest.update(f"\n{file.relative_to(_ROOT)} {len(source)}\n".encode() + source)
     return digest.hexdigest()[:20]
-
-
-def _prune(place: Path) -> None:
-    """Remove the kernel folders unused for longest; a process that still uses one recreates it."""
-    with suppress(FileNotFoundError):  # another process was faster
-        by_use = sorted(place.glob(_FOLDER + "*"), key=lambda folder: folder.stat().st_mtime, reverse=True)
-        for folder in by_use[1 + _FOLDERS_KEPT :]:
-            shutil.rmtree(folder, ignore_errors=True)

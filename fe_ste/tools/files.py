@@ -46,7 +46,11 @@ def replacement(path: Path, folder: Path | None = None) -> Iterator[IO[bytes]]:
             raise OSError(errno.EINVAL, "is a pipe or a device", str(path))
         path.parent.mkdir(parents=True, exist_ok=True)
         folder.mkdir(parents=True, exist_ok=True)
-        _remove_abandoned(folder, path.name)
+        for entry in os.scandir(folder):
+            if entry.name.startswith(f".{path.name}.") and entry.name.endswith(".partial"):
+                with suppress(OSError):  # another process removed it
+                    if time.time() - entry.stat(follow_symlinks=False).st_mtime > _ABANDONED:
+                        os.unlink(entry.path)
         growing = folder / f".{path.name}.{secrets.token_hex(4)}.partial"
         flags = os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
         handle = os.open(growing, flags, 0o666)
@@ -71,15 +75,6 @@ def _named_after(path: Path) -> Iterator[None]:
         if error.errno is None or not (error.filename is None or str(error.filename).endswith(".partial")):
             raise
         raise OSError(error.errno, error.strerror, str(path)) from error
-
-
-def _remove_abandoned(folder: Path, name: str) -> None:
-    """Remove what kills left of earlier writings of a file."""
-    for entry in os.scandir(folder):
-        if entry.name.startswith(f".{name}.") and entry.name.endswith(".partial"):
-            with suppress(OSError):  # another process removed it
-                if time.time() - entry.stat(follow_symlinks=False).st_mtime > _ABANDONED:
-                    os.unlink(entry.path)
 
 
 def sync_folder(folder: Path) -> None:

@@ -95,19 +95,14 @@ def _check_seal(file: IO[bytes], path: Path) -> str:
         raise FileError(
             f"{path}: has no checksum at its end: it was cut short, or written by an earlier version or another program"
         )
-    facts = _facts_of(file)
+    status = os.fstat(file.fileno())
+    facts = status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns
     checksum = _checked.get(facts) or _checksum_of(file, length)
     if written != _seal(checksum):
         raise FileError(f"{path}: is damaged, its content does not fit its checksum")
     if time.time() - 1e-9 * max(facts[-2:]) > SETTLED:
         _checked[facts] = checksum
     return checksum
-
-
-def _facts_of(file: IO[bytes]) -> tuple[int, ...]:
-    """Which file it is, its size, and when content and entry were changed last (ns)."""
-    facts = os.fstat(file.fileno())
-    return facts.st_dev, facts.st_ino, facts.st_size, facts.st_mtime_ns, facts.st_ctime_ns
 
 
 @contextmanager

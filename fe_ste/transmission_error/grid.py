@@ -153,7 +153,7 @@ def solve_grid(
     try:
         blocks = _blocks(axes, finished)
         done = (
-            _solved_here(compliance, axes, blocks, tell)
+            ((block, solve_positions(compliance, block.axes(axes), block.positions, tell)) for block in blocks)
             if executor is None
             else _solved_by_workers(compliance, axes, blocks, executor)
         )
@@ -181,18 +181,14 @@ def _blocks(axes: StateAxes, finished: Booleans) -> list[_Block]:
     return [block for block in blocks if not finished[list(block.positions), block.distance].all()]
 
 
-def _solved_here(
-    compliance: PairCompliance, axes: StateAxes, blocks: list[_Block], tell: Callable[[int], None]
-) -> Iterator[tuple[_Block, StateResults]]:
-    for block in blocks:
-        yield block, solve_positions(compliance, block.axes(axes), block.positions, tell)
-
-
 def _solved_by_workers(
     compliance: PairCompliance, axes: StateAxes, blocks: list[_Block], executor: GridExecutor
 ) -> Iterator[tuple[_Block, StateResults]]:
     """Yield blocks in the order in which workers finish them."""
-    packed = _packed(compliance)
+    # Fewer bytes than all that the compliance of a pair holds: a worker makes it again.
+    packed = pickle.dumps(
+        (compliance.pair, compliance.flanks, compliance.contact, compliance.modifications, compliance.tooth_gap)
+    )
     with _cancelled_on_error(executor) as waiting:
         for block in blocks:
             waiting[executor.submit(solve_block, packed, block.axes(axes), block.positions)] = block
@@ -228,13 +224,6 @@ def solve_block(packed: bytes, axes: StateAxes, positions: tuple[int, ...]) -> S
     """
     stop_if_asked()
     return solve_positions(_unpacked(packed), axes, positions, lambda solved: stop_if_asked())
-
-
-def _packed(compliance: PairCompliance) -> bytes:
-    """Pickle what a worker needs to make the compliance of a pair again: fewer bytes than all that it holds."""
-    return pickle.dumps(
-        (compliance.pair, compliance.flanks, compliance.contact, compliance.modifications, compliance.tooth_gap)
-    )
 
 
 @lru_cache(maxsize=1)

@@ -301,7 +301,7 @@ def known_contacts(wanted: Sequence[TableInput]) -> list[MeanContact | ContactEr
     -------
     in the order requested; for a contact that could not be solved, the reason
     """
-    keys = [_key(one) for one in wanted]
+    keys = [hashlib.sha256(f"{MEAN_CONTACT} {one.hash}".encode()).hexdigest() for one in wanted]
     asked = dict(zip(keys, wanted, strict=True))
     stored = {key: _contacts.get(key, _unpacked) for key in asked}
     found: dict[str, MeanContact | ContactError] = {key: kept for key, kept in stored.items() if kept is not None}
@@ -331,10 +331,6 @@ def known_contacts(wanted: Sequence[TableInput]) -> list[MeanContact | ContactEr
 def forget_contacts() -> None:
     """Drop all contacts from memory."""
     _contacts.forget()
-
-
-def _key(wanted: TableInput) -> str:
-    return hashlib.sha256(f"{MEAN_CONTACT} {wanted.hash}".encode()).hexdigest()
 
 
 def _unpacked(arrays: Arrays) -> MeanContact:

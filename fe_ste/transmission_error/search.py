@@ -220,7 +220,9 @@ class _ContactSearch:
         self.load = normal_load(pair, torque)
         self.kinematics = kinematics
         self.rotation = pmc * pair.pinion.angular_pitch
-        self.cell_width = _cell_width(compliance, self.load)
+        contact = compliance.contact
+        half_width = hertz_half_width(pair, self.load / least_contact_length(pair))
+        self.cell_width = 2 * contact.window * half_width / contact.cells
         self.too_deep = [math.inf] * len(starts)
         self.states: dict[int, ContactState | ContactError] = {}
 
@@ -240,7 +242,9 @@ class _ContactSearch:
         gap_per_misalignment = axial[cells.layer] * math.cos(compliance.pair.pinion.base_helix_angle)
         gap = {index: removed + self.misalignments[index] * gap_per_misalignment for index in pending}
         near = {index: g - g.min() < _GAP_REACH * self.starts[index].depth for index, g in gap.items()}
-        address = self._addresses(cells)
+        row = (cells.tooth - self.compliance.teeth[0]) * len(self.compliance.axial) + cells.layer
+        place = np.clip(np.floor(cells.offset + 0.25) + _DISTANCES // 2, 0, _DISTANCES - 1).astype(np.int64)
+        address = np.asarray(row * _DISTANCES + place, dtype=np.int64)
         expected = self._expected(pending, margin)[address] | _smallest_gap_cells(cells, removed)
         return _Window(cells, address, gap, near, expected)
 
@@ -258,16 +262,15 @@ class _ContactSearch:
         _widen(expected, axis=2, steps=margin + 1)
         return expected.reshape(-1)
 
-    def _addresses(self, cells: Cells) -> Integers:
-        row = (cells.tooth - self.compliance.teeth[0]) * len(self.compliance.axial) + cells.layer
-        place = np.clip(np.floor(cells.offset + 0.25) + _DISTANCES // 2, 0, _DISTANCES - 1).astype(np.int64)
-        return np.asarray(row * _DISTANCES + place, dtype=np.int64)
-
     def solve(self, window: _Window, group: list[int]) -> None:
         """Solve the states of `group`; one that needs other cells stays pending, with a start that asks for them."""
         near = np.any([window.near[index] for index in group], axis=0)
         if np.ptp(window.cells.tooth[near]) > self.compliance.reach:
-            self._come_nearer(group[0])
+            # More tooth pairs than can touch at once were reckoned to be near: cells further apart are left out.
+            index = group[0]
+            start = self.starts[index]
+            self.too_deep[index] = start.depth
+            self.starts[index] = replace(start, depth=0.7 * start.depth)
             return
         near &= window.expected
         end, border = (marked[near] for marked in _ends(window.cells, near))
@@ -281,7 +284,10 @@ class _ContactSearch:
                 solution = solve_complementarity(matrix, gap, self.load, self._guess(index, gap, address))
                 carrying = solution.force > 0
                 if self._settled(index, solution, gap, end) and not carrying[border].any():
-                    self.states[index] = self._state(cells, solution)
+                    half_along = 0.5 * self.compliance.slice_width / self.kinematics.base_helix_cosine
+                    self.states[index] = ContactState(
+                        self.pmc, self.load, cells, solution, solution.force / (4.0 * cells.half_across * half_along)
+                    )
                 self.starts[index] = replace(self.starts[index], touching=address[carrying])
             except ContactError as error:
                 self.states[index] = error
@@ -291,12 +297,6 @@ class _ContactSearch:
         if start.touching is None:
             return np.asarray(gap - gap.min() < 0.7 * start.depth)
         return np.isin(address, start.touching)
-
-    def _come_nearer(self, index: int) -> None:
-        """Leave out cells further apart: more tooth pairs than can touch at once were reckoned to be near."""
-        start = self.starts[index]
-        self.too_deep[index] = start.depth
-        self.starts[index] = replace(start, depth=0.7 * start.depth)
 
     def _settled(self, index: int, solution: ContactSolution, gap: Floats, end: Booleans) -> bool:
         """Whether all cells that may touch were there; else change the start."""
@@ -315,12 +315,6 @@ class _ContactSearch:
             return False
         self.starts[index] = replace(start, depth=depth)
         return True
-
-    def _state(self, cells: Cells, solution: ContactSolution) -> ContactState:
-        half_along = 0.5 * self.compliance.slice_width / self.kinematics.base_helix_cosine
-        return ContactState(
-            self.pmc, self.load, cells, solution, solution.force / (4.0 * cells.half_across * half_along)
-        )
 
 
 def _modification_gap(compliance: PairCompliance, cells: Cells) -> Floats:
@@ -377,14 +371,6 @@ def unloaded_states(compliance: PairCompliance, axes: StateAxes) -> xr.Dataset:
 def flank_radii(gear: Gear) -> tuple[float, float]:
     """Return the smallest and the largest radius of a gear's flank, m."""
     return min(gear.form_radius, gear.tip_radius), max(gear.form_radius, gear.tip_radius)
-
-
-def _cell_width(compliance: PairCompliance, load: float) -> float:
-    """Width of the contact cells along the profile under a normal load, m."""
-    pair = compliance.pair
-    contact = compliance.contact
-    half_width = hertz_half_width(pair, load / least_contact_length(pair))
-    return 2 * contact.window * half_width / contact.cells
 
 
 def new_start(compliance: PairCompliance, torque: float) -> SearchStart:

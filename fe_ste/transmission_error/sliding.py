@@ -54,7 +54,12 @@ def table_friction(pair: GearPair, state: xr.Dataset, speed: float, viscosity: f
     pmc = state["pmc"].to_numpy()[:, None, None]
     tooth = state["tooth"].to_numpy()[None, :, None]
     pressure = contact_line_stress(pair, pmc, tooth, axial, line_load)
-    first, second = _radii_of_curvature(pair, along)
+    # Radii of curvature of both flanks in the transverse section.
+    tangent = math.tan(pair.working_pressure_angle)
+    first, second = (
+        pair.pinion.base_radius * tangent + along,
+        pair.gear.base_radius * tangent - pair.gear.outward * along,
+    )
     ratio = pair.pinion.teeth / pair.gear.teeth
     surface_speeds = abs(speed) * first, abs(speed) * ratio * second
     mean = 0.5 * (surface_speeds[0] + surface_speeds[1])
@@ -109,9 +114,3 @@ def _loads_along_path(pair: GearPair, state: xr.Dataset) -> tuple[Floats, Floats
     tooth = state["tooth"].to_numpy()[None, :, None]
     base_point, along, _ = contact_path(pair, pmc, tooth, state["axial_position"].to_numpy())
     return load, np.broadcast_to(along - base_point, load.shape)
-
-
-def _radii_of_curvature(pair: GearPair, along: Floats) -> tuple[Floats, Floats]:
-    """Radii of curvature of both flanks in the transverse section, m, at places from the pitch point."""
-    tangent = math.tan(pair.working_pressure_angle)
-    return pair.pinion.base_radius * tangent + along, pair.gear.base_radius * tangent - pair.gear.outward * along

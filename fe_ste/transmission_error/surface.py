@@ -552,22 +552,12 @@ def _periodic_weights(count: int, pmc: float) -> Floats:
     """Weight of every position at pmc: cubic with central differences as slopes."""
     scaled = (pmc - np.floor(pmc)) * count
     piece = min(int(scaled), count - 1)
-    near = periodic_stencil(scaled - piece)
+    t = scaled - piece
+    square = t * t
+    cube = t**3
+    near = 0.5 * np.array(
+        [2.0 * square - t - cube, 2.0 - 5.0 * square + 3.0 * cube, t + 4.0 * square - 3.0 * cube, cube - square]
+    )
     full = np.zeros(count)
     np.add.at(full, (piece - 1 + np.arange(STENCIL)) % count, near)
     return full
-
-
-def periodic_stencil(t: float) -> Floats:
-    """Weights of the nodes before, at, after and next but one of an interval, t from 0 to 1.
-
-    Examples
-    --------
-    >>> periodic_stencil(0.0).tolist()
-    [0.0, 1.0, 0.0, 0.0]
-    """
-    square = t * t
-    cube = t**3
-    return 0.5 * np.array(
-        [2.0 * square - t - cube, 2.0 - 5.0 * square + 3.0 * cube, t + 4.0 * square - 3.0 * cube, cube - square]
-    )

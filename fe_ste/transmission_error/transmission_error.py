@@ -86,13 +86,7 @@ def static_transmission_error(
     geometry = pair.pair if isinstance(pair, PairCompliance) else pair
     axes = StateAxes.checked(geometry, torque, positions, centre_distance, misalignment)
     compliance = pair if isinstance(pair, PairCompliance) else pair_compliance(pair, mesh, contact)
-    return _solved_side_by_side(compliance, axes, progress).dataset(axes)
-
-
-def _solved_side_by_side(
-    compliance: PairCompliance, axes: StateAxes, progress: Callable[[int, int], None] | None
-) -> StateResults:
-    """Solve all states, both halves of the positions at once: the contact lets go of Python's lock most of the time."""
+    # Both halves of the positions at once: the contact lets go of Python's lock most of the time.
     total = math.prod(axes.shape)
     finished = count(1)
     telling = Lock()
@@ -108,7 +102,7 @@ def _solved_side_by_side(
         parts = side_by_side(lambda half: solve_positions(compliance, axes, half, tell), halves)
     for half, part in zip(halves, parts, strict=True):
         results.insert(half, slice(None), part)
-    return results
+    return results.dataset(axes)
 
 
 def solve_positions(

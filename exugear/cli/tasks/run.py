@@ -26,7 +26,7 @@ from exugear.system.tooth_mesh.laws.registry import LAWS
 from exugear.transient.outcome import LimitError, Run, RunError
 from exugear.transient.plan import EXPECTATIONS, check_disk, check_duration, rate_for, sample_bytes
 from exugear.transient.runup import BAND
-from exugear.transient.start import kept_band, kept_duration, refuse_if_busy, refuse_shorter, refuse_to_resume
+from exugear.transient.start import kept_setting, refuse_if_busy, refuse_shorter, refuse_to_resume
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.files import FileError
 
@@ -49,7 +49,7 @@ def run(
     if resume:
         duration = _duration_to_resume(project, duration)
     if band is None and resume:
-        band = kept_band(project.run_directory)
+        band = kept_setting(project.run_directory, "band")
     if band is None:
         band = BAND
     kept = {"band": band, "sample_rate": rate_for(band)}
@@ -142,7 +142,7 @@ def _duration_to_resume(project: Project, duration: float | None) -> float | Non
     """Return the total duration of a resumed run: as specified, else as before; raise an error if it is too short."""
     directory = project.run_directory
     if duration is None:
-        return kept_duration(directory)
+        return kept_setting(directory, "duration")
     if reason := refuse_shorter(directory, duration):
         raise BadInputError(f"--duration {duration:g}: {reason}; set a longer duration, or remove --duration")
     return duration

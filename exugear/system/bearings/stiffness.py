@@ -66,9 +66,7 @@ def axially_symmetric(stiffness: Floats) -> Floats:
 
 def rotate_stiffness(stiffness: Floats, angle: float) -> Floats:
     """Turn a 6x6 stiffness about z by an angle (rad), shape (6, 6)."""
-    cosine = math.cos(angle)
-    sine = math.sin(angle)
-    turn = np.kron(np.eye(2), np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]]))
+    turn = _turn(angle)
     turned: Floats = turn @ stiffness @ turn.T
     return turned
 

@@ -214,7 +214,10 @@ def reduce_external(model: ExternalModel) -> ReducedBody:
     matrices = placed_matrices(model)
     names = [*(seat.name for seat in model.seats), *(f"node_{n}" for n in matrices.nodes[len(model.seats) :])]
     places = [(float(x), float(y), float(z)) for x, y, z in matrices.positions]
-    stiffness = _without_rigid_energy(matrices)
+    # Few digits leave energy in rigid motions, which is taken out.
+    motions = matrices.rigid_motions(matrices.positions.mean(axis=0))
+    deforming = np.eye(matrices.size) - motions @ np.linalg.pinv(motions)
+    stiffness = symmetric(deforming.T @ symmetric(matrices.stiffness) @ deforming)
     if model.frame == "nonrotating":
         check_revolution(model.name, places, model.axis, matrices.mass, stiffness)
     mass, mass_scaled = selective_mass_scaling(symmetric(matrices.mass), stiffness, model.limit)
@@ -238,13 +241,6 @@ def reduce_external(model: ExternalModel) -> ReducedBody:
         surface=marked_nodes(matrices.positions, matrices.size),
         summary=ReductionSummary({}, time.perf_counter() - began, {"whole": ()}, {"whole": mass_scaled}),
     )
-
-
-def _without_rigid_energy(matrices: InterfaceMatrices) -> Floats:
-    """Stiffness without the energy that few digits leave in rigid motions, (n, n)."""
-    motions = matrices.rigid_motions(matrices.positions.mean(axis=0))
-    deforming = np.eye(matrices.size) - motions @ np.linalg.pinv(motions)
-    return symmetric(deforming.T @ symmetric(matrices.stiffness) @ deforming)
 
 
 def _gyroscopic_matrix(matrices: InterfaceMatrices, frame: Frame) -> Floats:

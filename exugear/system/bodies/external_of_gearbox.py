@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import LARGEST_MATRICES
-from exugear.gearbox.parts import Body
 from exugear.gearbox.sections.bodies import ExternalSeatSection, ExternalSection
 from exugear.gearbox.units import DEG, MM
 from exugear.system.bearings.stiffness import elastic_names
 from exugear.system.bodies.elastic_body import stated_damping
 from exugear.system.bodies.external import SAME_PLACE, ExternalModel, NodeSeat, matrices_of, placed_matrices
-from exugear.system.bodies.matrix_files.checks import MatrixReview
 from exugear.system.bodies.matrix_files.files import Kind, MatrixFiles
 from exugear.system.bodies.matrix_files.interface import MatrixFileError
 from exugear.system.bodies.reduction import ReductionError
-from exugear.system.bodies.seated_items import Item, frame_of, items_on
+from exugear.system.bodies.seated_items import Item, SeatedBody, frame_of, stated_seats
 from fe_ste.tools.arrays import Floats
 
 STATED_TOLERANCE = 0.01
@@ -32,21 +30,7 @@ STIFF_SEATS = (
 """What an RBE2 does, from housings reduced both ways."""
 
 
-@dataclass(frozen=True)
-class ExternalBody:
-    """A body of the gearbox file from matrices."""
-
-    model: ExternalModel
-    """All that it depends on."""
-    main_seat: str
-    sectors: Mapping[str, tuple[str, ...]]
-    shared_seats: Mapping[str, str]
-    damping_time: float | None
-    loss_factor: float
-    """As in `exugear.system.bodies.elastic_body.ElasticBody`."""
-
-
-def external_body(gearbox: Gearbox, name: str) -> ExternalBody:
+def external_body(gearbox: Gearbox, name: str) -> SeatedBody[ExternalModel]:
     """Return the data of a body's matrices from the gearbox file; its files are permitted, but not yet read.
 
     Raises
@@ -70,7 +54,7 @@ def external_body(gearbox: Gearbox, name: str) -> ExternalBody:
         raise gearbox.error(f"{key}.gyroscopic: only shafts, in a frame that does not turn, have one; remove it")
     if external.recovery is not None and frame != "ground":
         raise gearbox.error(f"{key}.recovery: only fixed bodies radiate sound here; remove it")
-    seats, sectors, shared = _seats(gearbox, body, external)
+    seats, sectors, shared = stated_seats(gearbox, body, "external", external.seats, partial(_node_seats, gearbox))
     names = [seat.name for seat in seats]
     if external.torque_seat is not None and external.torque_seat not in names:
         raise gearbox.error(f"{key}.torque_seat = {external.torque_seat!r}: no such seat; seats are {', '.join(names)}")
@@ -87,7 +71,7 @@ def external_body(gearbox: Gearbox, name: str) -> ExternalBody:
         band=external.band_Hz or gearbox.case.elasticity.band_Hz,
         axis=body.axis,
     )
-    return ExternalBody(model, external.torque_seat or names[0], sectors, shared, *stated_damping(external))
+    return SeatedBody(model, external.torque_seat or names[0], sectors, shared, *stated_damping(external))
 
 
 def _files(gearbox: Gearbox, key: str, external: ExternalSection) -> MatrixFiles:
@@ -124,52 +108,22 @@ def _rotation(turn_deg: tuple[float, float, float]) -> Floats:
     return rotation
 
 
-def _seats(
-    gearbox: Gearbox, body: Body, external: ExternalSection
-) -> tuple[list[NodeSeat], dict[str, tuple[str, ...]], dict[str, str]]:
-    """Seats of the body, the sectors of its gears, and the seats that bearings share."""
-    key = f"bodies.{body.family}.external.seats"
-    items = items_on(gearbox, body)
-    families = {item.family for item in items.values()}
-    sections = {name: external.seats.get(name, external.seats.get(item.family)) for name, item in items.items()}
-    others = {name: seat for name, seat in external.seats.items() if name not in items and name not in families}
-    seats: list[NodeSeat] = []
-    sectors: dict[str, tuple[str, ...]] = {}
-    shared: dict[str, str] = {}
-    for name, section in (sections | others).items():
-        item = items.get(name)
-        if section is not None and section.same_as is not None:
-            shared[name] = section.same_as
-        elif section is not None and section.sector_nodes:
-            if item is None or item.noun != "gear":
-                raise gearbox.error(f"{key}.{name}.sector_nodes: only the seat of a gear has sectors; set node")
-            parts = [
-                NodeSeat(f"{name}_{n}", item.position, node) for n, node in enumerate(section.sector_nodes, start=1)
-            ]
-            seats += parts
-            sectors[name] = tuple(part.name for part in parts)
-        elif item is None or section is not None or item.needed:
-            seats.append(_seat(gearbox, f"{key}.{name}", name, item, section or ExternalSeatSection()))
-    names = [seat.name for seat in seats]
-    doubled = next((name for name in names if names.count(name) > 1), None)
-    if doubled is not None:
-        raise gearbox.error(f"{key}: two seats are both named {doubled!r}; rename one")
-    for name, other in shared.items():
-        if other not in names:
-            raise gearbox.error(f"{key}.{name}.same_as = {other!r}: no such seat; seats are {', '.join(names)}")
-    if not seats:
-        raise gearbox.error(f"{key}: the body has no seat; define at least one")
-    return seats, sectors, shared
-
-
-def _seat(gearbox: Gearbox, key: str, name: str, item: Item | None, section: ExternalSeatSection) -> NodeSeat:
+def _node_seats(
+    gearbox: Gearbox, key: str, name: str, item: Item | None, section: ExternalSeatSection | None
+) -> list[NodeSeat]:
+    """One seat, from its entry in the file and the position of the item on it, or its sectors."""
+    if section is not None and section.sector_nodes:
+        if item is None or item.noun != "gear":
+            raise gearbox.error(f"{key}.sector_nodes: only the seat of a gear has sectors; set node")
+        return [NodeSeat(f"{name}_{n}", item.position, node) for n, node in enumerate(section.sector_nodes, start=1)]
     position = None if item is None else item.position
-    if section.position_mm is not None:
+    node = None if section is None else section.node
+    if section is not None and section.position_mm is not None:
         x, y, z = section.position_mm
         position = (MM * x, MM * y, MM * z)
-    if position is None and section.node is None:
+    if position is None and node is None:
         raise gearbox.error(f"{key}: no gear, bearing or mount of the body is named {name!r}; set node or position_mm")
-    return NodeSeat(name, position or (0.0, 0.0, 0.0), section.node)
+    return [NodeSeat(name, position or (0.0, 0.0, 0.0), node)]
 
 
 def check_external(gearbox: Gearbox, name: str) -> None:
@@ -190,8 +144,20 @@ def check_external(gearbox: Gearbox, name: str) -> None:
         placed = placed_matrices(external.model)
     except (MatrixFileError, ReductionError) as error:
         raise gearbox.error(f"{key}: {error}") from None
-    for line in _contradictions(gearbox, name, found):
-        raise gearbox.error(f"{key}.{line}")
+    section = gearbox.case.bodies[gearbox.body(name).family].external
+    assert section is not None
+    stated = section.stated_mass_kg
+    if stated is not None and abs(found.mass - stated) > STATED_TOLERANCE * stated:
+        raise gearbox.error(
+            f"{key}.stated_mass_kg = {stated:g}: the matrices have {found.mass:.6g} kg; check units and model"
+        )
+    if section.stated_centre_mm is not None:
+        off = float(np.linalg.norm(MM * np.array(section.stated_centre_mm) - found.centre))
+        if off > STATED_TOLERANCE * found.size:
+            centre = ", ".join(f"{1e3 * value:.5g}" for value in found.centre)
+            raise gearbox.error(
+                f"{key}.stated_centre_mm: the matrices have their centre at ({centre}) mm; check units and model"
+            )
     at_sectors = {seat for seats in external.sectors.values() for seat in seats}
     for seat, place, node in zip(external.model.seats, placed.positions, placed.nodes, strict=False):
         off = float(np.linalg.norm(place - np.array(seat.position)))
@@ -200,20 +166,6 @@ def check_external(gearbox: Gearbox, name: str) -> None:
                 f"{key}.seats: sector node {node} is {1e3 * off:.4g} mm from the centre of the gear; refer the mean "
                 "motion of each sector to the centre of the gear, as an RBE3 with its reference node there does"
             )
-
-
-def _contradictions(gearbox: Gearbox, name: str, found: MatrixReview) -> Iterator[str]:
-    """Stated figures that differ from those of the matrices."""
-    external = gearbox.case.bodies[gearbox.body(name).family].external
-    assert external is not None
-    stated = external.stated_mass_kg
-    if stated is not None and abs(found.mass - stated) > STATED_TOLERANCE * stated:
-        yield f"stated_mass_kg = {stated:g}: the matrices have {found.mass:.6g} kg; check units and model"
-    if external.stated_centre_mm is not None:
-        off = float(np.linalg.norm(MM * np.array(external.stated_centre_mm) - found.centre))
-        if off > STATED_TOLERANCE * found.size:
-            place = ", ".join(f"{1e3 * value:.5g}" for value in found.centre)
-            yield f"stated_centre_mm: the matrices have their centre at ({place}) mm; check units and model"
 
 
 def external_facts(gearbox: Gearbox) -> Iterator[str]:

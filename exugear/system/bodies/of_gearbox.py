@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import lru_cache, partial
 from pathlib import Path
 
 from exugear.gearbox.gearbox import Gearbox
@@ -29,10 +29,10 @@ from exugear.gearbox.units import MM, optional_si, si
 from exugear.system.bearings.stiffness import elastic_names, mounts_at_work
 from exugear.system.bodies.elastic_body import ElasticBody, FloatingBody, stated_damping
 from exugear.system.bodies.external import ExternalModel, placed_matrices, reduce_external
-from exugear.system.bodies.external_of_gearbox import ExternalBody, check_external, external_body
+from exugear.system.bodies.external_of_gearbox import check_external, external_body
 from exugear.system.bodies.matrix_files.interface import MatrixFileError
 from exugear.system.bodies.reduction import Blank, ReducedBody, ReductionError, RigidInertia, with_rigid_inertia
-from exugear.system.bodies.seated_items import Item, frame_of, items_on, seat_width
+from exugear.system.bodies.seated_items import Item, SeatedBody, frame_of, items_on, seat_width, stated_seats
 from exugear.system.bodies.shaft_sections import (
     MeshSize,
     SeatBand,
@@ -234,21 +234,7 @@ def solid_of_shaft(model: ShaftModel, size: MeshSize = SOLID_SIZE) -> SolidModel
 # Solids of a gearbox: shapes and meshes from files, seats where gears, bearings and mounts sit
 
 
-@dataclass(frozen=True)
-class SolidBody:
-    """A solid of the gearbox file."""
-
-    model: SolidModel
-    """All that its reduction depends on."""
-    main_seat: str
-    sectors: Mapping[str, tuple[str, ...]]
-    shared_seats: Mapping[str, str]
-    damping_time: float | None
-    loss_factor: float
-    """As in `exugear.system.bodies.elastic_body.ElasticBody`."""
-
-
-def solid_body(gearbox: Gearbox, name: str) -> SolidBody:
+def solid_body(gearbox: Gearbox, name: str) -> SeatedBody[SolidModel]:
     """Return the data of a body's solid from the gearbox file; its file exists and is permitted, but is not yet read.
 
     Raises
@@ -284,7 +270,7 @@ def solid_body(gearbox: Gearbox, name: str) -> SolidBody:
     band = solid.band_Hz or gearbox.case.elasticity.band_Hz
     if band >= gearbox.case.elasticity.limit_Hz:
         raise gearbox.error(f"{key}.band_Hz = {band:g}: must be below elasticity.limit_Hz")
-    seats, sectors, shared = _solid_seats(gearbox, body, solid)
+    seats, sectors, shared = stated_seats(gearbox, body, "solid", solid.seats, partial(_solid_seats, gearbox))
     names = [seat.name for seat in seats]
     if solid.torque_seat is not None and solid.torque_seat not in names:
         raise gearbox.error(f"{key}.torque_seat = {solid.torque_seat!r}: no such seat; seats are {', '.join(names)}")
@@ -299,48 +285,14 @@ def solid_body(gearbox: Gearbox, name: str) -> SolidBody:
         blanks=_solid_blanks(gearbox, body, solid, names),
         axis=body.axis,
     )
-    return SolidBody(model, solid.torque_seat or names[0], sectors, shared, *stated_damping(solid))
+    return SeatedBody(model, solid.torque_seat or names[0], sectors, shared, *stated_damping(solid))
 
 
 def _solid_seats(
-    gearbox: Gearbox, body: Body, solid: SolidSection
-) -> tuple[list[SolidSeat], dict[str, tuple[str, ...]], dict[str, str]]:
-    """Seats of a solid, the sectors of its gears, and the seats that bearings share."""
-    key = f"bodies.{body.family}.solid.seats"
-    items = items_on(gearbox, body)
-    families = {item.family for item in items.values()}
-    sections = {name: solid.seats.get(name, solid.seats.get(item.family)) for name, item in items.items()}
-    others = {name: section for name, section in solid.seats.items() if name not in items and name not in families}
-    seats: list[SolidSeat] = []
-    sectors: dict[str, tuple[str, ...]] = {}
-    shared_seats: dict[str, str] = {}
-    for name, section in (sections | others).items():
-        item = items.get(name)
-        if section is not None and section.same_as is not None:
-            shared_seats[name] = section.same_as
-        elif item is None or section is not None or item.needed:
-            seat = _solid_seat(gearbox, f"{key}.{name}", name, item, section or SolidSeatSection())
-            count = None if section is None else section.sectors
-            if count is not None and (item is None or item.noun != "gear"):
-                raise gearbox.error(f"{key}.{name}.sectors = {count}: only the seat of a gear has sectors")
-            parts = [seat] if count is None else _parts(seat, count)
-            seats += parts
-            if count is not None:
-                sectors[name] = tuple(part.name for part in parts)
-    names = [seat.name for seat in seats]
-    doubled = next((name for name in names if names.count(name) > 1), None)
-    if doubled is not None:
-        raise gearbox.error(f"{key}: two seats are both named {doubled!r}; rename one")
-    for name, other in shared_seats.items():
-        if other not in names:
-            raise gearbox.error(f"{key}.{name}.same_as = {other!r}: no such seat; seats are {', '.join(names)}")
-    if not seats:
-        raise gearbox.error(f"{key}: the body has no seat; define at least one")
-    return seats, sectors, shared_seats
-
-
-def _solid_seat(gearbox: Gearbox, key: str, name: str, item: Item | None, section: SolidSeatSection) -> SolidSeat:
-    """One seat, from its entry in the file and the known data of the item on it."""
+    gearbox: Gearbox, key: str, name: str, item: Item | None, stated: SolidSeatSection | None
+) -> list[SolidSeat]:
+    """One seat, from its entry in the file and the known data of the item on it, or equal sectors of it."""
+    section = stated or SolidSeatSection()
     diameter, width = (None, None) if item is None else (item.diameter, item.width)
     if section.diameter_mm is not None:
         diameter = si(section, "diameter_mm")
@@ -359,15 +311,16 @@ def _solid_seat(gearbox: Gearbox, key: str, name: str, item: Item | None, sectio
         raise gearbox.error(
             f"{key}: {what} {name!r} requires its position and size; set {' and '.join(missing)} in [{key}]"
         )
-    return SolidSeat(name, position, diameter / 2.0, width, 0.5 * (optional_si(section, "inner_diameter_mm") or 0.0))
-
-
-def _parts(seat: SolidSeat, count: int) -> list[SolidSeat]:
-    """Equal sectors of a seat, numbered from 1, the first in the middle of +x."""
+    inner = 0.5 * (optional_si(section, "inner_diameter_mm") or 0.0)
+    count = section.sectors
+    if count is None:
+        return [SolidSeat(name, position, diameter / 2.0, width, inner)]
+    if item is None or item.noun != "gear":
+        raise gearbox.error(f"{key}.sectors = {count}: only the seat of a gear has sectors")
+    # Numbered from 1, the first in the middle of +x.
     extent = 2.0 * math.pi / count
     return [
-        SolidSeat(f"{seat.name}_{n + 1}", seat.centre, seat.radius, seat.width, seat.inner_radius, (n * extent, extent))
-        for n in range(count)
+        SolidSeat(f"{name}_{n + 1}", position, diameter / 2.0, width, inner, (n * extent, extent)) for n in range(count)
     ]
 
 
@@ -469,7 +422,7 @@ def reduced_bodies(
 def _elastic_body(gearbox: Gearbox, body: Body, folder: Path | None) -> ElasticBody:
     section = gearbox.case.bodies[body.family]
     model: ShaftModel | SolidModel | ExternalModel
-    seated: SolidBody | ExternalBody | None = None
+    seated: SeatedBody[SolidModel] | SeatedBody[ExternalModel] | None = None
     if section.external is not None:
         key, seated = "external", external_body(gearbox, body.name)
         model, digest = seated.model, seated.model.file_digest

@@ -126,7 +126,17 @@ def radiating_surface(
     >>> round(surface.area, 12), surface.matrix.round(12)
     (1.5, array([[0.5]]))
     """
-    surface = _surface_points(mesh)
+    nodes = facet_nodes(mesh, np.asarray(mesh.boundary_facets()))
+    element = skfem.ElementTriP2() if nodes.shape[1] == 6 else skfem.ElementQuad2()
+    at, weights = skfem.quadrature.get_quadrature(element, 5)
+    functions = [element.lbasis(at, number) for number in range(nodes.shape[1])]
+    values = np.stack([value for value, _ in functions])
+    at_nodes = np.asarray(mesh.doflocs).T[nodes]
+    tangents = np.einsum("fka,kbq->bfqa", at_nodes, np.stack([slope for _, slope in functions]), optimize=True)
+    across = np.cross(tangents[0], tangents[1])
+    sizes = np.linalg.norm(across, axis=2)
+    places = np.einsum("fka,kq->fqa", at_nodes, values, optimize=True)
+    surface = SurfacePoints(nodes, values, places, across / sizes[..., None], sizes * weights)
     discs = _discs(seats) if closed else ()
     air = _OutsideAir.around(mesh, surface.nodes, discs)
     outer = air.reaches(surface.places, surface.normals)
@@ -144,24 +154,6 @@ def radiating_surface(
             matrix += disc.point_area * rows.T @ rows
             area += disc.point_area * len(counted)
     return RadiatingSurface(symmetric(matrix), area, float(surface.areas.sum()), band)
-
-
-def _surface_points(mesh: Any) -> SurfacePoints:
-    nodes = facet_nodes(mesh, np.asarray(mesh.boundary_facets()))
-    element = _facet_element(nodes)
-    points, weights = skfem.quadrature.get_quadrature(element, 5)
-    functions = [element.lbasis(points, number) for number in range(nodes.shape[1])]
-    values = np.stack([value for value, _ in functions])
-    at_nodes = np.asarray(mesh.doflocs).T[nodes]
-    tangents = np.einsum("fka,kbq->bfqa", at_nodes, np.stack([slope for _, slope in functions]), optimize=True)
-    normals = np.cross(tangents[0], tangents[1])
-    sizes = np.linalg.norm(normals, axis=2)
-    places = np.einsum("fka,kq->fqa", at_nodes, values, optimize=True)
-    return SurfacePoints(nodes, values, places, normals / sizes[..., None], sizes * weights)
-
-
-def _facet_element(nodes: Integers) -> Any:
-    return skfem.ElementTriP2() if nodes.shape[1] == 6 else skfem.ElementQuad2()
 
 
 def _integral(surface: SurfacePoints, outer: Booleans, modes: Floats) -> Floats:

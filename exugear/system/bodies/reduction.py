@@ -35,7 +35,8 @@ import scipy
 import scipy.linalg
 from numpy.typing import NDArray
 
-from exugear.system.kernels.coordinates import AXIAL, BODY_SIZE, TILT
+from exugear.system.bodies.matrix_files.interface import rigid_motions
+from exugear.system.kernels.coordinates import AXIAL, TILT
 from fe_ste.tools.arrays import Floats, Integers, SparseMatrix
 from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.stores import Store
@@ -171,20 +172,6 @@ class ReducedBody(
             else f"matrices of {self.size} coordinates"
         )
 
-    def first_coordinate(self, seat_name: str) -> int:
-        """Find the first of a seat's six coordinates.
-
-        Raises
-        ------
-        ReductionError
-            No seat of that name.
-        """
-        for n, seat in enumerate(self.seats):
-            if seat.name == seat_name:
-                return BODY_SIZE * n
-        names = ", ".join(seat.name for seat in self.seats)
-        raise ReductionError(f"body {self.name}: no seat {seat_name!r}; seats are {names}")
-
     @cached_property
     def blocks(self) -> tuple[Integers, ...]:
         """Coordinates that neither mass nor stiffness couples to others: both bending planes, torsion, stretching."""
@@ -196,12 +183,7 @@ class ReducedBody(
 
     def rigid_motions(self, centre: Sequence[float] | Floats) -> Floats:
         """Rigid motions (n, 6): translations, and turns about a centre (3,) in the gearbox's coordinates."""
-        motions = np.zeros((self.size, 6))
-        for n, seat in enumerate(self.seats):
-            x, y, z = np.asarray(seat.position) - np.asarray(centre)
-            motions[6 * n : 6 * n + 6] = np.eye(6)
-            motions[6 * n : 6 * n + 3, 3:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
-        return motions
+        return rigid_motions(self.size, [seat.position for seat in self.seats], centre)
 
     @cached_property
     def rigid_inertia(self) -> RigidInertia:
@@ -297,7 +279,14 @@ def reduce_component(
     normal, frequencies = free_interface_modes(loaded_mass, stiffness, rigid, (np.pi * band) ** 2, band, backend)
     # Less the constraint modes that move the seats alike, a normal mode leaves the seats where they are.
     inner = np.hstack([normal - constraint @ (seats @ normal), relief])
-    modes = np.hstack([constraint, _uncoupled(mass, stiffness, inner)])
+    # Shapes that span the same, uncoupled from each other, of unit modal mass.
+    inner = inner / np.sqrt(np.einsum("im,im->m", inner, mass @ inner))
+    share, axes = np.linalg.eigh(inner.T @ (mass @ inner))
+    # Shapes that others span already have no mass of their own.
+    independent = share > INDEPENDENCE_TOLERANCE
+    inner = inner @ (axes[:, independent] / np.sqrt(share[independent]))
+    _, axes = np.linalg.eigh(inner.T @ (stiffness @ inner))
+    modes = np.hstack([constraint, inner @ axes])
     count = len(seats)
     reduced_mass = modes.T @ (mass @ modes)
     reduced_mass[:count, :count] += blanks
@@ -435,17 +424,6 @@ def _converged(diagonal: list[float], beside: list[float], shift: float, band: f
     return None
 
 
-def _uncoupled(mass: SparseMatrix, stiffness: SparseMatrix, inner: Floats) -> Floats:
-    """Shapes that span `inner` (n, m), uncoupled from each other, of unit modal mass; what is nothing left out."""
-    inner = inner / np.sqrt(np.einsum("im,im->m", inner, mass @ inner))
-    share, axes = np.linalg.eigh(inner.T @ (mass @ inner))
-    # Shapes that others span already have no mass of their own.
-    independent = share > INDEPENDENCE_TOLERANCE
-    inner = inner @ (axes[:, independent] / np.sqrt(share[independent]))
-    _, axes = np.linalg.eigh(inner.T @ (stiffness @ inner))
-    return np.asarray(inner @ axes)
-
-
 def symmetric(matrix: Floats) -> Floats:
     """Symmetric part of a matrix, free of the round-off of products."""
     return 0.5 * (matrix + matrix.T)
@@ -559,11 +537,6 @@ def with_rigid_inertia(body: ReducedBody, wanted: RigidInertia) -> ReducedBody:
     return replace(body, mass=symmetric(mass), gyroscopic=0.5 * (gyroscopic - gyroscopic.T))
 
 
-def with_stiffness_factor(body: ReducedBody, factor: float) -> ReducedBody:
-    """Return the same body with its stiffness times a factor."""
-    return replace(body, stiffness=factor * body.stiffness)
-
-
 # Reductions of elastic bodies, stored in files by the hash of their input
 
 
@@ -579,7 +552,18 @@ def load_or_reduce(path: Path, key: str, reduce: Callable[[], ReducedBody]) -> R
     body = store.read(_from_arrays)
     if body is None:
         body = reduce()
-        store.write(_arrays_of(body), compressed=True)
+        words = {
+            "name": body.name,
+            "seats": [[seat.name, seat.position] for seat in body.seats],
+            "frame": body.frame,
+            "groups": body.modal_groups,
+            "figures": {stored: getattr(body.summary, name) for stored, name in _SUMMARY.items()},
+        }
+        arrays = {name: getattr(body, name) for name in _MATRICES}
+        arrays |= {name: getattr(body.surface, name) for name in _SURFACE}
+        if body.radiating is not None:
+            arrays |= {f"radiating_{name}": np.array(getattr(body.radiating, name)) for name in _RADIATING}
+        store.write({"words": np.array(json.dumps(words)), **arrays}, compressed=True)
     return body
 
 
@@ -593,21 +577,6 @@ _SUMMARY = {
     "lowered": "mass_scaled_frequencies",
 }
 """Names in files, which stay so that old files are found again, and in `ReductionSummary`."""
-
-
-def _arrays_of(body: ReducedBody) -> dict[str, NDArray[Any]]:
-    words = {
-        "name": body.name,
-        "seats": [[seat.name, seat.position] for seat in body.seats],
-        "frame": body.frame,
-        "groups": body.modal_groups,
-        "figures": {stored: getattr(body.summary, name) for stored, name in _SUMMARY.items()},
-    }
-    arrays = {name: getattr(body, name) for name in _MATRICES}
-    arrays |= {name: getattr(body.surface, name) for name in _SURFACE}
-    if body.radiating is not None:
-        arrays |= {f"radiating_{name}": np.array(getattr(body.radiating, name)) for name in _RADIATING}
-    return {"words": np.array(json.dumps(words)), **arrays}
 
 
 def _from_arrays(arrays: Mapping[str, NDArray[Any]]) -> ReducedBody:

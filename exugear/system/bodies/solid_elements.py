@@ -230,27 +230,23 @@ def ordered_corners(mesh: Any, facets: Integers) -> Integers:
     corners = np.asarray(mesh.facets)[:, facets].T
     places = np.asarray(mesh.doflocs).T
     if corners.shape[1] == 4:
-        corners = _around(corners, places)
+        # The corners of each quadrilateral go in the order around it.
+        points = places[corners]
+        away = points - points.mean(axis=1, keepdims=True)
+        start = away[:, 0]
+        normal = np.cross(start, away[:, 1]) + np.cross(start, away[:, 2])
+        sideways = np.cross(normal, start)
+        angle = np.arctan2(
+            np.einsum("fcd,fd->fc", away, sideways) * np.linalg.norm(start, axis=1)[:, None],
+            np.einsum("fcd,fd->fc", away, start) * np.linalg.norm(sideways, axis=1)[:, None],
+        )
+        corners = np.take_along_axis(corners, np.argsort(angle, axis=1), axis=1)
     points = places[corners]
     normal = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
     inside = places[np.asarray(mesh.t)[:, np.asarray(mesh.f2t)[0, facets]].T].mean(axis=1)
     inward = np.einsum("fd,fd->f", normal, points.mean(axis=1) - inside) < 0.0
     corners = np.where(inward[:, None], corners[:, ::-1], corners)
     return np.asarray(np.column_stack([corners, corners[:, 2]]) if corners.shape[1] == 3 else corners)
-
-
-def _around(corners: Integers, places: Floats) -> Integers:
-    """Corners (f, 4) of quadrilaterals, put in the order around each."""
-    points = places[corners]
-    away = points - points.mean(axis=1, keepdims=True)
-    start = away[:, 0]
-    normal = np.cross(start, away[:, 1]) + np.cross(start, away[:, 2])
-    sideways = np.cross(normal, start)
-    angle = np.arctan2(
-        np.einsum("fcd,fd->fc", away, sideways) * np.linalg.norm(start, axis=1)[:, None],
-        np.einsum("fcd,fd->fc", away, start) * np.linalg.norm(sideways, axis=1)[:, None],
-    )
-    return np.asarray(np.take_along_axis(corners, np.argsort(angle, axis=1), axis=1))
 
 
 # Seats on meshed solids: bands of cylinders and flat rings, each with the rigid motion nearest to its surface's

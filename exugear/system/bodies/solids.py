@@ -254,7 +254,11 @@ def gyroscopic_matrix(model: SolidModel, reduced: ReducedSolid) -> Floats:
     for number, seat in enumerate(model.seats):
         if seat.name in model.blanks:
             at_seat = slice(6 * number, 6 * number + 6)
-            matrix[at_seat, at_seat] += _blank_gyroscopics(model.blanks[seat.name], model.frame)
+            # A rigid ring has int rho x^2 = int rho y^2 = axial / 2 and int rho z^2 = transverse - axial / 2.
+            blank = model.blanks[seat.name]
+            matrix[at_seat, at_seat] += rigid_gyroscopic_matrix(
+                RigidInertia(blank.mass, (0.0, 0.0, 0.0), blank.transverse, blank.axial), model.frame
+            )
     if model.frame == "nonrotating":
         spin = np.zeros(size)
         spin[SPIN : 6 * len(model.seats) : 6] = 1.0
@@ -264,14 +268,6 @@ def gyroscopic_matrix(model: SolidModel, reduced: ReducedSolid) -> Floats:
         deforming = np.eye(size) - np.outer(spin, momentum) / (spin @ momentum)
         matrix = deforming.T @ matrix @ deforming
     return 0.5 * (matrix - matrix.T)
-
-
-def _blank_gyroscopics(blank: Blank, frame: Frame) -> Floats:
-    """Matrix G (6, 6) of a rigid ring on its seat, from `exugear.system.bodies.reduction.rigid_gyroscopic_matrix`.
-
-    Its mass distribution has int rho x^2 = int rho y^2 = axial / 2 and int rho z^2 = transverse - axial / 2.
-    """
-    return rigid_gyroscopic_matrix(RigidInertia(blank.mass, (0.0, 0.0, 0.0), blank.transverse, blank.axial), frame)
 
 
 def _surface(model: SolidModel, reduced: ReducedSolid) -> BodySurface:

@@ -42,7 +42,7 @@ from exugear.system.bodies.shaft_sections import (
 )
 from exugear.system.bodies.solid_elements import SolidError
 from fe_ste.geometry.gears import Material
-from fe_ste.tools.arrays import Booleans, Floats, Integers, SparseMatrix
+from fe_ste.tools.arrays import Floats, Integers, SparseMatrix
 
 if TYPE_CHECKING:
     import skfem
@@ -207,7 +207,17 @@ class Shaft:
         self._bands = [self._locate(seat) for seat in self.seats]
         self.tapers = Tapers(self.sections)
         radii, heights = self._lines()
-        self.lines = _half_section(radii, heights, self._solid)
+        # Quadrilaterals over the steel of the half-section.
+        r_middle, z_middle = np.meshgrid(
+            (radii[1:] + radii[:-1]) / 2.0, (heights[1:] + heights[:-1]) / 2.0, indexing="ij"
+        )
+        number = np.clip(np.searchsorted(self._ends, z_middle) - 1, 0, len(self.sections) - 1)
+        i, j = np.nonzero(np.asarray((r_middle < self.tapers.outer[number]) & (r_middle > self.tapers.inner[number])))
+        count = len(heights)
+        corners = np.stack([i * count + j, (i + 1) * count + j, (i + 1) * count + j + 1, i * count + j + 1])
+        used, numbers = np.unique(corners, return_inverse=True)
+        points = np.stack([radii[used // count], heights[used % count]])
+        self.lines = skfem.MeshQuad(points, numbers.reshape(corners.shape))
         self.mesh = self._tapered(self.lines)
         self.basis = skfem.Basis(self.mesh, skfem.ElementQuad2(), intorder=INTEGRATION_ORDER)
         self.nodes: Floats = np.asarray(self.basis.doflocs)
@@ -221,11 +231,6 @@ class Shaft:
     def section_under(self, seat: SeatBand) -> ShaftSection:
         """Return the section that a seat lies on: the thicker one where it is a plane between two."""
         return self.sections[self._locate(seat)[0]]
-
-    def _solid(self, r: Floats, z: Floats) -> Booleans:
-        """Return which points of the half-section are steel."""
-        number = np.clip(np.searchsorted(self._ends, z) - 1, 0, len(self.sections) - 1)
-        return np.asarray((r < self.tapers.outer[number]) & (r > self.tapers.inner[number]))
 
     def _tapered(self, lines: Any) -> Any:
         """Mesh of the half-section from that of the cylinders which stand for it."""
@@ -482,17 +487,6 @@ def _graded_line(breaks: Sequence[float], corners: set[float], size: float, grad
     return np.array(lines)
 
 
-def _half_section(radii: Floats, heights: Floats, solid: Any) -> Any:
-    """Quadrilaterals over the steel of the half-section."""
-    r_middle, z_middle = np.meshgrid((radii[1:] + radii[:-1]) / 2.0, (heights[1:] + heights[:-1]) / 2.0, indexing="ij")
-    i, j = np.nonzero(solid(r_middle, z_middle))
-    count = len(heights)
-    corners = np.stack([i * count + j, (i + 1) * count + j, (i + 1) * count + j + 1, i * count + j + 1])
-    used, numbers = np.unique(corners, return_inverse=True)
-    points = np.stack([radii[used // count], heights[used % count]])
-    return skfem.MeshQuad(points, numbers.reshape(corners.shape))
-
-
 CORE = 0.5
 """Radius of the square core of a solid section over that of its first ring of lines."""
 BULGE = 0.5
@@ -541,7 +535,25 @@ def turned_hexahedra(shaft: Shaft, around: int = 8) -> Any:
 
     mesh = skfem.MeshHex2.from_mesh(skfem_mesh(logical, numbers.reshape(-1, 8)))
     circles = np.concatenate([[0.0], radii[1:]]) if on_axis else np.concatenate([[0.0], radii])
-    return skfem.MeshHex2(_tapered(shaft, _map_to_circles(np.asarray(mesh.doflocs), circles)), mesh.t)
+    x, y, z = np.asarray(mesh.doflocs)
+    ring = np.maximum(np.abs(x), np.abs(y))
+    safe = np.where(ring > 0.0, ring, 1.0)
+    sideways = np.abs(x) < np.abs(y)
+    angle = np.pi / 4.0 * np.where(sideways, x, y) / safe * np.sign(np.where(sideways, y, x))
+    direction = np.where(
+        sideways,
+        np.sign(y) * np.array([np.sin(angle), np.cos(angle)]),
+        np.sign(x) * np.array([np.cos(angle), np.sin(angle)]),
+    )
+    square = np.array([x, y]) / safe / np.sqrt(2.0)
+    bulging = CORE * circles[1] * ((1.0 - BULGE * ring) * square + BULGE * ring * direction)
+    inside = ring * bulging
+    edge = CORE * circles[1] * ((1.0 - BULGE) * square + BULGE * direction)
+    share = np.clip(ring - 1.0, 0.0, 1.0)
+    between = (1.0 - share) * edge + share * circles[1] * direction
+    radius = np.interp(ring, 1.0 + np.arange(len(circles)), circles)
+    plane = np.where(ring <= 1.0, inside, np.where(ring <= 2.0, between, radius * direction))
+    return skfem.MeshHex2(_tapered(shaft, np.vstack([plane, z])), mesh.t)
 
 
 def _tapered(shaft: Shaft, points: Floats) -> Floats:
@@ -577,26 +589,3 @@ def _square_rings(around: int, levels: int) -> tuple[Floats, Integers, Integers]
         total = total + around
     numbers = np.repeat(np.arange(levels), [len(f) for f in faces])
     return np.concatenate(points), np.concatenate(faces).astype(np.int64), numbers
-
-
-def _map_to_circles(logical: Floats, circles: Floats) -> Floats:
-    """Move points (3, n) of the logical square onto circles; `circles` are the radii of rings 1, 2, 3, ..."""
-    x, y, z = logical
-    ring = np.maximum(np.abs(x), np.abs(y))
-    safe = np.where(ring > 0.0, ring, 1.0)
-    sideways = np.abs(x) < np.abs(y)
-    angle = np.pi / 4.0 * np.where(sideways, x, y) / safe * np.sign(np.where(sideways, y, x))
-    direction = np.where(
-        sideways,
-        np.sign(y) * np.array([np.sin(angle), np.cos(angle)]),
-        np.sign(x) * np.array([np.cos(angle), np.sin(angle)]),
-    )
-    square = np.array([x, y]) / safe / np.sqrt(2.0)
-    bulging = CORE * circles[1] * ((1.0 - BULGE * ring) * square + BULGE * ring * direction)
-    inside = ring * bulging
-    edge = CORE * circles[1] * ((1.0 - BULGE) * square + BULGE * direction)
-    share = np.clip(ring - 1.0, 0.0, 1.0)
-    between = (1.0 - share) * edge + share * circles[1] * direction
-    radius = np.interp(ring, 1.0 + np.arange(len(circles)), circles)
-    plane = np.where(ring <= 1.0, inside, np.where(ring <= 2.0, between, radius * direction))
-    return np.vstack([plane, z])

@@ -32,7 +32,7 @@ from exugear.system.bodies.reduction import (
     symmetric,
 )
 from exugear.system.bodies.shaft_sections import STANDARD_SIZE, MeshSize, SeatBand, ShaftSection
-from exugear.system.bodies.turned_section import Harmonic, HarmonicName, Shaft
+from exugear.system.bodies.turned_section import HarmonicName, Shaft
 from exugear.system.kernels.coordinates import SPIN
 from fe_ste.geometry.gears import Material
 from fe_ste.tools.arrays import Floats, Integers, SparseMatrix
@@ -100,16 +100,28 @@ def reduce_shaft(model: ShaftModel) -> ReducedBody:
         mass, mass_scaled[name] = selective_mass_scaling(component.mass, component.stiffness, model.limit)
         components[name] = replace(component, mass=mass)
     layout = _HarmonicLayout(len(seats), {name: c.component_modes.shape[1] for name, c in components.items()})
-    gyroscopic = _gyroscopic(model, harmonics["bending"], components["bending"])
+    # Polar inertia 2 g of one bending plane, blanks included; half of it is what a rigid tilt has of 2 g.
+    polar: SparseMatrix = harmonics["bending"].gyroscopic
+    modes = components["bending"].component_modes
+    doubled: Floats = 2.0 * modes.T @ (polar @ modes)
+    for n, seat in enumerate(model.seats):
+        if seat.name in model.blanks:
+            tilt = 2 * n + 1  # a seat has a displacement and a tilt in each plane
+            doubled[tilt, tilt] += model.blanks[seat.name].axial
+    gyroscopic = symmetric(doubled)
     spin = np.zeros(layout.size)
     spin[SPIN : 6 * len(seats) : 6] = 1.0
     x, y, z = model.origin
+    # 2 g of one plane: M qx'' + 2 Omega g qy' and M qy'' - 2 Omega g qx'.
+    matrix = np.zeros((layout.size, layout.size))
+    matrix[np.ix_(layout.x, layout.y)] = gyroscopic * layout.sign_y
+    matrix[np.ix_(layout.y, layout.x)] = -(gyroscopic * layout.sign_y).T
     return ReducedBody(
         name=model.name,
         seats=tuple(Seat(seat.name, (x, y, z + seat.z)) for seat in model.seats),
         mass=layout.gather({name: component.mass for name, component in components.items()}),
         stiffness=layout.gather({name: component.stiffness for name, component in components.items()}),
-        gyroscopic=layout.coupling_matrix(gyroscopic),
+        gyroscopic=matrix,
         spin=spin,
         frame="nonrotating",
         modal_groups=layout.modal_groups,
@@ -140,18 +152,6 @@ def _blank_masses(model: ShaftModel, harmonic: HarmonicName) -> Floats:
             "stretching": [blank.mass],
         }[harmonic]
     return np.diag(values)
-
-
-def _gyroscopic(model: ShaftModel, bending: Harmonic, component: ReducedComponent) -> Floats:
-    """Polar inertia 2 g of one bending plane, blanks included; half of it is what a rigid tilt has of 2 g."""
-    gyroscopic: SparseMatrix = bending.gyroscopic
-    modes = component.component_modes
-    doubled: Floats = 2.0 * modes.T @ (gyroscopic @ modes)
-    for n, seat in enumerate(model.seats):
-        if seat.name in model.blanks:
-            tilt = 2 * n + 1  # a seat has a displacement and a tilt in each plane
-            doubled[tilt, tilt] += model.blanks[seat.name].axial
-    return symmetric(doubled)
 
 
 class _HarmonicLayout:
@@ -199,13 +199,6 @@ class _HarmonicLayout:
         for harmonic, part in parts.items():
             for index, sign in self.planes(harmonic):
                 matrix[np.ix_(index, index)] = part * np.outer(sign, sign)
-        return matrix
-
-    def coupling_matrix(self, doubled: Floats) -> Floats:
-        """Gyroscopic matrix from 2 g of one plane: M qx'' + 2 Omega g qy' and M qy'' - 2 Omega g qx'."""
-        matrix = np.zeros((self.size, self.size))
-        matrix[np.ix_(self.x, self.y)] = doubled * self.sign_y
-        matrix[np.ix_(self.y, self.x)] = -(doubled * self.sign_y).T
         return matrix
 
 

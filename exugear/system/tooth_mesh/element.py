@@ -359,12 +359,21 @@ def mesh_elements(
         phase = phases[mesh.name]
         ends = (_node(mesh.pinion, mesh.pair.pinion, bodies, nodes), _node(mesh.gear, mesh.pair.gear, bodies, nodes))
         known = contact.get(mesh.name) if contact and flank == usual[mesh.name] else None
-        secant, tangent, load = _stiffness_at_load(law, data, mesh, static[mesh.name])
+        secant, tangent = law.samples(data, mesh, static[mesh.name])
+        load = abs(static[mesh.name]) or (data.force if isinstance(data, MeshCurve) else 0.0)
+        for values in (secant, tangent):
+            if not (np.all(np.isfinite(values)) and np.all(values > 0.0)):
+                raise MeshError(f"pair {mesh.pair.name}: mesh stiffness must be positive and finite")
         deflection, force = law.rows(mesh, flank, ends, angles)
         centre, misalignment = position_rows(mesh, flank, ends)
         mesh_stiffness, factor = law.stiffness(mesh, secant, angles)
         mesh_tangent, _ = law.stiffness(mesh, tangent, angles)
         even = even_contact(mesh.pair, load, float(np.mean(secant)), float(np.mean(tangent)))
+        # Deflection, change of centre distance and misalignment at zero coordinates.
+        offset = np.zeros(3)
+        for start, carrying in ((0, mesh.pinion), (BODY_SIZE, mesh.gear)):
+            way = np.array((displaced or {}).get(carrying, (0.0, 0.0)))
+            offset[:2] += deflection[start : start + 2] @ way, centre[start : start + 2] @ way
         element = MeshElement(
             mesh=mesh,
             law=law,
@@ -384,7 +393,7 @@ def mesh_elements(
             centre=centre,
             misalignment=misalignment,
             errors=wheel_errors(gearbox, mesh, flank, phase, orientation),
-            offset=_offset(mesh, displaced or {}, deflection, centre),
+            offset=offset,
             table=law.table_flanks(mesh, flank, ends, phase, data, time),
             computed_from=data.table if isinstance(data, MeshCurve) and flank == usual[mesh.name] else None,
             load_ways=_load_ways(law, data, flank, usual[mesh.name]),
@@ -398,31 +407,12 @@ def mesh_elements(
     return tuple(elements)
 
 
-def _stiffness_at_load(law: Law, data: MeshData, mesh: Mesh, static_force: float) -> tuple[Floats, Floats, float]:
-    """Secant and tangent stiffness (n,) over the mesh cycle along the line of action, N/m, and their load, N."""
-    secant, tangent = law.samples(data, mesh, static_force)
-    load = abs(static_force) or (data.force if isinstance(data, MeshCurve) else 0.0)
-    for values in (secant, tangent):
-        if not (np.all(np.isfinite(values)) and np.all(values > 0.0)):
-            raise MeshError(f"pair {mesh.pair.name}: mesh stiffness must be positive and finite")
-    return secant, tangent, load
-
-
 def _load_ways(law: Law, data: MeshData, flank: int, usual: int) -> Floats:
     """Ways of the load as `MeshElement.load_ways`; of the flank that a table is of, not of that behind."""
     # A flank -1 is that of the table turned about: the ends of the face change places.
     if flank == usual:
         return flank * law.load_ways(data)
     return np.zeros((2, 0))
-
-
-def _offset(mesh: Mesh, displaced: Mapping[str, tuple[float, float]], deflection: Floats, centre: Floats) -> Floats:
-    """Deflection, change of centre distance and misalignment at zero coordinates, (3,)."""
-    offset = np.zeros(3)
-    for start, body in ((0, mesh.pinion), (BODY_SIZE, mesh.gear)):
-        way = np.array(displaced.get(body, (0.0, 0.0)))
-        offset[:2] += deflection[start : start + 2] @ way, centre[start : start + 2] @ way
-    return offset
 
 
 def _node(body: str, gear: Gear, bodies: Mapping[str, Body], nodes: Mapping[str, Floats] | None) -> Floats:

@@ -38,7 +38,6 @@ class MeshGeometry:
     tangential: Floats
     pressure_angle: float
     pinion_radius: float
-    gear_radius: float
 
     @classmethod
     def of(cls, mesh: Mesh) -> MeshGeometry:
@@ -53,7 +52,6 @@ class MeshGeometry:
             tangential=np.array([-radial[1], radial[0], 0.0]),
             pressure_angle=angle,
             pinion_radius=pair.pinion.base_radius / math.cos(angle),
-            gear_radius=pair.gear.base_radius / math.cos(angle),
         )
 
     def plane_of_action(self, flank: int) -> Floats:
@@ -180,11 +178,6 @@ def friction_rows(mesh: Mesh, flank: int, nodes: tuple[Floats, Floats]) -> Float
     return np.array([wrench_row(force, pitch_point_of(mesh, geometry, nodes), nodes), turning, tilting])
 
 
-def mesh_phases(gearbox: Gearbox, flanks: Mapping[str, int]) -> dict[str, float]:
-    """Compute the PMC of each mesh at zero angles: see `tooth_places`."""
-    return tooth_places(gearbox, flanks)[0]
-
-
 def tooth_places(gearbox: Gearbox, flanks: Mapping[str, int]) -> tuple[dict[str, float], dict[tuple[str, str], float]]:
     """Place the teeth of all wheels from tooth numbers, planet places and tooth thickness.
 
@@ -305,7 +298,11 @@ def _wheel_error(
     deviation = gearbox.deviations.get(wheel)
     if deviation is None:
         return np.zeros(0)
-    error = _run_out_error(deviation, contact)
+    # Way of the teeth's axis along the line of action, away from the other wheel.
+    x, y, _ = MeshGeometry.of(contact.mesh).plane_of_action(contact.flank)
+    away = -1.0 if contact.number == 1 else 1.0
+    angle = deviation.eccentricity_angle + _angles(deviation)
+    error = np.asarray(away * deviation.eccentricity * (x * np.cos(angle) + y * np.sin(angle)))
     if deviation.pitch.size:
         error = error + _pitch_error(deviation, contact, orientation[wheel], phase)
     return error
@@ -333,11 +330,3 @@ def _pitch_error(deviation: WheelDeviation, contact: ToothContact, orientation: 
         inside = (ahead >= 0) & (ahead < len(pairs))
         error[inside] += gap * shares[inside, ahead[inside]]
     return error
-
-
-def _run_out_error(deviation: WheelDeviation, contact: ToothContact) -> Floats:
-    """Way of the teeth's axis along the line of action, away from the other wheel."""
-    x, y, _ = MeshGeometry.of(contact.mesh).plane_of_action(contact.flank)
-    away = -1.0 if contact.number == 1 else 1.0
-    angle = deviation.eccentricity_angle + _angles(deviation)
-    return np.asarray(away * deviation.eccentricity * (x * np.cos(angle) + y * np.sin(angle)))

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.tooth_mesh.tables import TABLE_FOLDER, requested_tables
+from exugear.system.tooth_mesh.tables import TABLE_FOLDER, figure, requested_tables
 from fe_ste.reference.newton import Iteration
 from fe_ste.reference.table import NonlinearInput, NonlinearTable
 
@@ -96,12 +96,6 @@ def summarise_reference(request: ReferenceRequest, table: NonlinearTable) -> dic
     Results without a converged position are None.
     """
     data = table.dataset
-
-    def figure(values: xr.DataArray) -> float | None:
-        value = float(values)
-        if value == value:
-            return value
-        return None
 
     def peak_to_peak(values: xr.DataArray) -> float | None:
         if int(values.notnull().sum()) < 2:

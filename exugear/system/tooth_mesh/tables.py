@@ -399,6 +399,12 @@ def _request(
     return TableRequest(name, wanted, path, stored)
 
 
+def figure(values: xr.DataArray | float) -> float | None:
+    """Return a main result as a number, None if it is not one."""
+    value = float(values)
+    return None if math.isnan(value) else value
+
+
 def summarise(request: TableRequest, table: MeshTable) -> dict[str, Any]:
     """Return the main results of a table; the unit is part of the key.
 
@@ -406,12 +412,6 @@ def summarise(request: TableRequest, table: MeshTable) -> dict[str, Any]:
     """
     data = table.static_state
     pair = request.wanted.pair
-
-    def figure(values: xr.DataArray | float) -> float | None:
-        value = float(values)
-        if value == value:
-            return value
-        return None
 
     return {
         "pair": request.name,
@@ -545,19 +545,15 @@ def shuttling_pairs(gearbox: Gearbox, folder: Path, harmonic: int = 1) -> tuple[
             continue
         with suppress(TableError, GapError):  # no law along a row takes such a table
             point = complete_cycle(fitting_table(gearbox, name, folder).static_state)
-            loads.append(_way(name, point, pair.face_width, harmonic))
+            centre, error, stiffness = (
+                np.asarray(point[key].to_numpy(), dtype=np.float64).reshape(-1)
+                for key in ("load_centroid", "ste", "mesh_stiffness")
+            )
+            force = float(point["line_of_action_force"].mean())
+            amplitude = _harmonic(centre, harmonic)
+            pushed = max(stiffness.mean() * _harmonic(error, harmonic), LEAST_PUSH * force)
+            loads.append(Shuttling(name, amplitude, float(force * amplitude / (0.5 * pair.face_width) / pushed)))
     return tuple(sorted(loads, key=lambda own: -own.over_error))
-
-
-def _way(name: str, point: xr.Dataset, width: float, harmonic: int) -> Shuttling:
-    centre, error, stiffness = (
-        np.asarray(point[key].to_numpy(), dtype=np.float64).reshape(-1)
-        for key in ("load_centroid", "ste", "mesh_stiffness")
-    )
-    force = float(point["line_of_action_force"].mean())
-    amplitude = _harmonic(centre, harmonic)
-    pushed = max(stiffness.mean() * _harmonic(error, harmonic), LEAST_PUSH * force)
-    return Shuttling(name, amplitude, float(force * amplitude / (0.5 * width) / pushed))
 
 
 def _harmonic(values: Floats, number: int) -> float:

@@ -86,24 +86,8 @@ class Connectors(NamedTuple):
     """(c,) position of each connector in the assembly."""
     ends: Integers
     """(c, 2) numbers of the two bodies in `Bodies`."""
-    local: Floats
-    """(c, 2, 3) attachment in each body's axes, m."""
-    gap: Floats
-    """(c, 3) second attachment against the first at zero angles, m."""
-    repeated: Integers
-    """(c,) 1 where the one before has the same ends, so that angles and their rates are known."""
-    twisting: Integers
-    """(c,) 1 where the angle about z acts on these ends, else 0."""
-    stiffness: Floats
-    """(c, 6, 6) by column and row, N/m .. N m/rad."""
-    offset: Floats
-    """(c, 6) load of the linear law without displacement, N and N m."""
-    time: Floats
-    """(c,) damping over stiffness where the two are in proportion, s."""
     damping: Floats
-    """(c, 6, 6) by column and row where they are not."""
-    damped: Integers
-    """(c,) 1 where they are not, else 0."""
+    """(c, 6, 6) by column and row, N s/m .. N m s/rad, where it is not in proportion to the stiffness."""
     rolling: RollingArrays | None
     """Rolling laws, in parallel to these; None where there are none."""
 
@@ -282,68 +266,43 @@ class _Numbers:
         return self.turning.index(coordinate)
 
 
-def _connectors(numbers: _Numbers) -> tuple[Connectors, Integers]:
-    """Connectors, and the slot of the sine of each body's spin where a connector needs it."""
+def _connectors(numbers: _Numbers) -> tuple[Connectors, Pairs, Integers]:
+    """Connectors, pairs of their bodies, and the slot of the sine of each body's spin where a connector needs it."""
     given = numbers.assembly.connectors
     ends = np.array([[numbers.body(int(s)) for s in pair] for pair in given.bodies], dtype=np.int64).reshape(-1, 2)
     order = np.lexsort((ends[:, 1], ends[:, 0])).astype(np.int64)
     given = given.chosen(order)
     ends = ends[order]
+    count = len(ends)
     slots = np.zeros(len(numbers.starts) + 1, dtype=np.int64)
-    twisting = np.zeros(len(ends), dtype=np.int64)
-    matrices = np.zeros((2, len(ends), BODY_SIZE, BODY_SIZE))
-    time = np.zeros(len(ends))
+    twisting = np.zeros(count, dtype=np.int64)
+    matrices = np.zeros((2, count, BODY_SIZE, BODY_SIZE))
+    data = np.zeros((count, PAIR_SIZE))
     for n, (i, j) in enumerate(ends):
         stiffness = _without_round_off(given.stiffness[n])
         damping = _without_round_off(given.damping[n])
-        time[n] = _damping_time(stiffness, damping)
-        matrices[:, n] = stiffness.T, damping.T * (time[n] == 0.0)
+        data[n, LAG] = _damping_time(stiffness, damping)
+        matrices[:, n] = stiffness.T, damping.T * (data[n, LAG] == 0.0)
         twisting[(ends == ends[n]).all(axis=1)] |= stiffness[:, SPIN].any()
         for end, needed in ((i, True), (j, stiffness[:, SPIN].any() or given.local[n, 1, :2].any())):
             if needed and end < len(numbers.starts):
                 slots[end] = numbers.slot(numbers.starts[end] + SPIN)
-    connectors = Connectors(
-        number=order,
-        ends=ends,
-        local=given.local,
-        gap=(given.node[:, 1] + given.local[:, 1]) - (given.node[:, 0] + given.local[:, 0]),
-        repeated=np.append(0, (ends[1:] == ends[:-1]).all(axis=1)).astype(np.int64)[: len(ends)],
-        twisting=twisting,
-        stiffness=matrices[0],
-        offset=given.offset,
-        time=time,
-        damping=matrices[1],
-        damped=matrices[1].any(axis=(1, 2)).astype(np.int64),
-        rolling=given.rolling if given.rolling.layout.size else None,
-    )
-    return connectors, slots
-
-
-def _pairs(connectors: Connectors, nodes: Floats) -> Pairs:
-    """Pairs of bodies of the connectors; nodes (c, 3): second node against the first at zero angles."""
-    count = len(connectors.number)
-    begins = np.flatnonzero(connectors.repeated == 0)
-    data = np.zeros((count, PAIR_SIZE))
     columns = data[:, : PADDED * BODY_SIZE].reshape(count, BODY_SIZE, PADDED)
     columns[:, :, :TILT], columns[:, :, PADDED_TILT : PADDED_TILT + TILT] = (
-        connectors.stiffness[:, :, :TILT],
-        connectors.stiffness[:, :, TILT:],
+        matrices[0, :, :, :TILT],
+        matrices[0, :, :, TILT:],
     )
-    data[:, OFFSET : OFFSET + TILT] = connectors.offset[:, :TILT]
-    data[:, OFFSET + PADDED_TILT : OFFSET + PADDED_TILT + TILT] = connectors.offset[:, TILT:]
-    data[:, FIRST_ARM : FIRST_ARM + 3] = connectors.local[:, 0]
-    data[:, LAG] = connectors.time
-    data[:, SECOND_ARM : SECOND_ARM + 3] = connectors.local[:, 1]
-    data[:, OFF_AXIS] = connectors.local[:, 1, :2].any(axis=1)
-    data[:, GAP : GAP + 3] = connectors.gap
-    data[:, NODES : NODES + 3] = nodes
-    data[:, DAMPED] = connectors.damped
-    return Pairs(
-        ends=connectors.ends[begins],
-        first=np.append(begins, count).astype(np.int64),
-        twisting=connectors.twisting[begins],
-        data=data,
-    )
+    data[:, OFFSET : OFFSET + TILT] = given.offset[:, :TILT]
+    data[:, OFFSET + PADDED_TILT : OFFSET + PADDED_TILT + TILT] = given.offset[:, TILT:]
+    data[:, FIRST_ARM : FIRST_ARM + 3] = given.local[:, 0]
+    data[:, SECOND_ARM : SECOND_ARM + 3] = given.local[:, 1]
+    data[:, OFF_AXIS] = given.local[:, 1, :2].any(axis=1)
+    data[:, GAP : GAP + 3] = (given.node[:, 1] + given.local[:, 1]) - (given.node[:, 0] + given.local[:, 0])
+    data[:, NODES : NODES + 3] = given.node[:, 1] - given.node[:, 0]
+    data[:, DAMPED] = matrices[1].any(axis=(1, 2))
+    begins = np.flatnonzero(np.append(True, (ends[1:] != ends[:-1]).any(axis=1))[:count])
+    pairs = Pairs(ends[begins], np.append(begins, count).astype(np.int64), twisting[begins], data)
+    return Connectors(order, ends, matrices[1], given.rolling if given.rolling.layout.size else None), pairs, slots
 
 
 def _places(numbers: _Numbers) -> tuple[Places, Integers]:
@@ -463,11 +422,10 @@ def _loads(assembly: Assembly, loads: LoadTable) -> Loads:
 def equations_of(assembly: Assembly, loads: LoadTable) -> Equations:
     """Arrays of an assembly under loads, as the compiled loops read them."""
     numbers = _Numbers(assembly)
-    connectors, slots = _connectors(numbers)
+    connectors, pairs, slots = _connectors(numbers)
     places, ends = _places(numbers)
     meshes = _meshes(numbers, ends)
     joints = _joints(numbers)
-    nodes = assembly.connectors.node[connectors.number]
     inertia = assembly.inertia
     springs = assembly.springs
     # All sorts of elastic bodies together, so that few sorts of systems are compiled.
@@ -488,7 +446,7 @@ def equations_of(assembly: Assembly, loads: LoadTable) -> Equations:
         bodies=bodies,
         places=places,
         connectors=connectors,
-        pairs=_pairs(connectors, nodes[:, 1] - nodes[:, 0]),
+        pairs=pairs,
         meshes=meshes,
         travelling=assembly.travelling if elastic else None,
         springs=Springs(springs.coordinates, springs.stiffness, springs.damping),

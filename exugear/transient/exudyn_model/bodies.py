@@ -378,7 +378,13 @@ def add_bodies(parts: Parts, q: Floats, v: Floats) -> None:
         if assembly.has_six(body):
             _add_rigid_body(parts, body, q, v)
         elif body.name not in assembly.elastic_bodies:
-            _add_spinning_body(parts, body, q, v)
+            i = parts.assembly.spin[body.name]
+            parts.nodes[body.name] = parts.mbs.AddNode(
+                items.Node1D(referenceCoordinates=[0.0], initialCoordinates=[q[i]], initialVelocities=[v[i]])
+            )
+            parts.bodies[body.name] = parts.mbs.AddObject(
+                items.ObjectMass1D(physicsMass=body.axial, nodeNumber=parts.nodes[body.name])
+            )
     if assembly.floating:
         parts.floating = FloatingBodies(parts.mbs, assembly, q, v)
     for name in assembly.elastic_bodies:
@@ -386,17 +392,6 @@ def add_bodies(parts: Parts, q: Floats, v: Floats) -> None:
             parts.elastic_nodes[name] = parts.floating.nodes[name]
         else:
             _add_elastic_body(parts, name, q, v)
-
-
-def _add_spinning_body(parts: Parts, body: Body, q: Floats, v: Floats) -> None:
-    """Add a body that has its spin alone."""
-    i = parts.assembly.spin[body.name]
-    parts.nodes[body.name] = parts.mbs.AddNode(
-        items.Node1D(referenceCoordinates=[0.0], initialCoordinates=[q[i]], initialVelocities=[v[i]])
-    )
-    parts.bodies[body.name] = parts.mbs.AddObject(
-        items.ObjectMass1D(physicsMass=body.axial, nodeNumber=parts.nodes[body.name])
-    )
 
 
 def _add_rigid_body(parts: Parts, body: Body, q: Floats, v: Floats) -> None:

@@ -110,16 +110,11 @@ class FloatingSystem:
             return euler_rotation(parameters)
         return kinematics.RotXYZ2RotationMatrix(parameters), kinematics.RotXYZ2G(parameters)
 
-    def seat_motion(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """Motion (6 s,) and velocity of the seats in axes that do not turn, from the object's coordinates.
+    def _seat_motion(self, q: Floats, v: Floats, turn: Floats, arms: Floats, jacobian: Floats) -> tuple[Floats, Floats]:
+        """Motion (6 s,) and velocity of the seats in axes that do not turn, with what `_kinematics` gives.
 
         Tilts are those of the seat's axis; about z the motion is the elastic twist, the velocity the speed.
         """
-        turn, _, arms, jacobian = self._kinematics(q)
-        return self._seat_motion(q, v, turn, arms, jacobian)
-
-    def _seat_motion(self, q: Floats, v: Floats, turn: Floats, arms: Floats, jacobian: Floats) -> tuple[Floats, Floats]:
-        """As `seat_motion`, with what `_kinematics` gives at these coordinates."""
         modal = q[self._modal]
         spatial = (jacobian @ v).reshape(-1, 6)
         axes = turn[:, 2] + self._turns @ modal @ turn.T @ skew(turn[:, 2])
@@ -197,7 +192,8 @@ class FloatingSystem:
             q = np.array(data.GetODE2Coordinates())[self._order]
             v = np.array(data.GetODE2Coordinates_t())[self._order]
             times.append(t)
-            motions.append(self.seat_motion(q, v)[0])
+            turn, _, arms, jacobian = self._kinematics(q)
+            motions.append(self._seat_motion(q, v, turn, arms, jacobian)[0])
             return True
 
         self.mbs.SetPostStepUserFunction(post_step)

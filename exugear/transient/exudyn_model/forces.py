@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from exugear.gearbox.parts import Joint
-from exugear.system.kernels.connectors import ConnectorArrays
-from exugear.system.kernels.coordinates import BODY_SIZE, SPIN, SpringArrays
+from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.system.kernels.meshes import ROW_SIZE, MeshArrays
 from exugear.system.kernels.modal_damping import add_modal_damping, modal_matrix, modal_memory
 from exugear.system.kernels.rolling import CAGE_TORQUE, ELASTIC_PART, rolling_force, rolling_memory
@@ -43,28 +42,21 @@ def add_supports(parts: Parts) -> None:
         ends = ((bearing.on, position + pin), (bearing.body, position))
         rolling = assembly.connectors.rolling
         law = _rolling_law(parts, n) if rolling.first[n] < rolling.first[n + 1] else 0
+        # The linear law has no load where the matrix resists nothing: rows that do not resist do not push either.
+        size = np.sqrt(np.abs(np.diag(assembly.connectors.stiffness[n])))
+        scale = np.divide(1.0, size, out=np.zeros(BODY_SIZE), where=size > 0.0)
+        # Forces and moments differ by orders of magnitude: to a unit diagonal before a rank is decided.
+        matrix = scale[:, None] * assembly.connectors.stiffness[n] * scale
+        found = np.linalg.pinv(matrix, rcond=1e-12, hermitian=True) @ (scale * assembly.connectors.offset[n])
         parts.mbs.AddObject(
             items.RigidBodySpringDamper(
                 markerNumbers=[parts.support_marker(body, bearing.name, at) for body, at in ends],
                 stiffness=assembly.connectors.stiffness[n],
                 damping=assembly.connectors.damping[n],
-                offset=_offset(assembly.connectors, n),
+                offset=np.asarray(-scale * found),
                 springForceTorqueUserFunction=law,
             )
         )
-
-
-def _offset(connectors: ConnectorArrays, n: int) -> Floats:
-    """Displacement (6,) at which the linear law of connector n has no load, m and rad.
-
-    It has none where the matrix resists nothing: rows that do not resist do not push either.
-    """
-    size = np.sqrt(np.abs(np.diag(connectors.stiffness[n])))
-    scale = np.divide(1.0, size, out=np.zeros(BODY_SIZE), where=size > 0.0)
-    # Forces and moments differ by orders of magnitude: to a unit diagonal before a rank is decided.
-    matrix = scale[:, None] * connectors.stiffness[n] * scale
-    found = np.linalg.pinv(matrix, rcond=1e-12, hermitian=True) @ (scale * connectors.offset[n])
-    return np.asarray(-scale * found)
 
 
 def _rolling_law(parts: Parts, n: int) -> Callable[..., Floats]:
@@ -300,7 +292,15 @@ def add_minimal_system(
             numberOfODE2Coordinates=motions.shape[1],
         )
     )
-    stiffness, damping = _spring_matrices(assembly.size, assembly.springs)
+    # Torsional couplings.
+    stiffness = np.zeros((assembly.size, assembly.size))
+    damping = np.zeros((assembly.size, assembly.size))
+    pair = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    for (i, j), k, d in zip(
+        assembly.springs.coordinates, assembly.springs.stiffness, assembly.springs.damping, strict=True
+    ):
+        stiffness[np.ix_([i, j], [i, j])] += k * pair
+        damping[np.ix_([i, j], [i, j])] += d * pair
     steady = loads.generalized(assembly, 0.0, q, v) if loads.is_constant else None
     memory = modal_memory(assembly.modal)
 
@@ -328,14 +328,3 @@ def add_minimal_system(
             jacobianUserFunction=jacobian,
         )
     )
-
-
-def _spring_matrices(size: int, springs: SpringArrays) -> tuple[Floats, Floats]:
-    """Stiffness and damping (size, size) of torsional couplings."""
-    stiffness = np.zeros((size, size))
-    damping = np.zeros((size, size))
-    pair = np.array([[1.0, -1.0], [-1.0, 1.0]])
-    for (i, j), k, d in zip(springs.coordinates, springs.stiffness, springs.damping, strict=True):
-        stiffness[np.ix_([i, j], [i, j])] += k * pair
-        damping[np.ix_([i, j], [i, j])] += d * pair
-    return stiffness, damping

@@ -89,7 +89,9 @@ def catalogue_rows(section: CatalogueSection) -> tuple[RollingRow, ...]:
 @lru_cache(maxsize=128)
 def _rows_of(section: CatalogueSection, stated: frozenset[str]) -> tuple[RollingRow, ...]:
     """Rows of a section; equal sections differ by the keys that the file states, which are no estimates."""
-    full = _completed(section)
+    full = section
+    for estimate in estimates(section):
+        full = with_estimate(full, estimate, estimate.value)
     row = _ball_row(full) if full.type.endswith("ball") else _roller_row(full)
     return *_placed(full, row), *_ribs(full, row)
 
@@ -133,12 +135,6 @@ def with_estimate(section: CatalogueSection, estimate: Estimate, value: float) -
     """
     given: float | int = round(value) if estimate.key == "element_count" else value
     return section.model_copy(update={estimate.key: given})
-
-
-def _completed(section: CatalogueSection) -> CatalogueSection:
-    for estimate in estimates(section):
-        section = with_estimate(section, estimate, estimate.value)
-    return section
 
 
 def _is_open(section: CatalogueSection, key: str) -> bool:

@@ -231,23 +231,6 @@ def element_loads(contacts: RowContacts, displacement: Floats) -> Floats:
     return load
 
 
-def element_pressures(contacts: RowContacts, displacement: Floats) -> Floats:
-    """Return the maximum Hertzian pressure of each rolling element on a raceway, row by row, Pa, shape (elements,).
-
-    For rollers it is the pressure of the most loaded lamina, on the inner raceway, which is the more curved one;
-    pressures at the very end of a roller, higher than Hertzian, are neglected. For balls it is the pressure on the
-    raceway of lower conformity.
-    """
-    pressure = np.zeros(contacts.first[-1])
-    if contacts.laminae is not None:
-        laminae = contacts.laminae
-        np.maximum.at(pressure, laminae.element, laminae.pressure * np.sqrt(lamina_loads(laminae, displacement)))
-    if contacts.balls is not None:
-        balls = contacts.balls
-        pressure[balls.element] = balls.pressure * np.cbrt(ball_loads(balls, displacement))
-    return pressure
-
-
 def loads_of_laminae(contacts: RowContacts, displacement: Floats) -> tuple[Floats | None, ...]:
     """Load of each lamina, N, for each row an array (elements, laminae); None for rows of balls."""
     if contacts.laminae is None:
@@ -305,11 +288,20 @@ class BearingState(ReprMixin):
 
 def bearing_state(contacts: RowContacts, displacement: Floats) -> BearingState:
     """Evaluate loads and pressures of a bearing at a displacement of the inner ring, shape (6,)."""
+    # The most loaded lamina of a roller on the inner raceway, which is the more curved one; pressures at the very end
+    # of a roller, higher than Hertzian, are neglected. Balls: the raceway of lower conformity.
+    pressure = np.zeros(contacts.first[-1])
+    if contacts.laminae is not None:
+        laminae = contacts.laminae
+        np.maximum.at(pressure, laminae.element, laminae.pressure * np.sqrt(lamina_loads(laminae, displacement)))
+    if contacts.balls is not None:
+        balls = contacts.balls
+        pressure[balls.element] = balls.pressure * np.cbrt(ball_loads(balls, displacement))
     return BearingState(
         displacement=displacement,
         load=bearing_load(contacts, displacement),
         element_load=element_loads(contacts, displacement),
-        element_pressure=element_pressures(contacts, displacement),
+        element_pressure=pressure,
         lamina_load=loads_of_laminae(contacts, displacement),
         contacts=contacts,
     )
@@ -343,9 +335,11 @@ def equilibrium(
 
     Examples
     --------
-    >>> from exugear.system.bearings.rolling.rows import CylindricalRollerBearing
-    >>> bearing = CylindricalRollerBearing(bore=0.160, outside_diameter=0.290, width=0.080)
-    >>> state = equilibrium(bearing, (129.9e3, 0.0, 0.0))
+    >>> from exugear.gearbox.sections.connections import CatalogueSection
+    >>> from exugear.system.bearings.rolling.catalogue import catalogue_rows
+    >>> from exugear.system.bearings.rolling.rows import BearingOfRows
+    >>> section = CatalogueSection(type="cylindrical_roller", bore_mm=160.0, outer_diameter_mm=290.0, width_mm=80.0)
+    >>> state = equilibrium(BearingOfRows(catalogue_rows(section)), (129.9e3, 0.0, 0.0))
     >>> round(1e6 * state.displacement[0])  # micrometres
     53
     """
@@ -456,9 +450,11 @@ def pitch_averaged_tangent(bearing: RollingBearing, force: ArrayLike, positions:
 
     Examples
     --------
-    >>> from exugear.system.bearings.rolling.rows import CylindricalRollerBearing
-    >>> bearing = CylindricalRollerBearing(bore=0.100, outside_diameter=0.180, width=0.046)
-    >>> stiffness = pitch_averaged_tangent(bearing, (33.5e3, 0.0, 0.0))
+    >>> from exugear.gearbox.sections.connections import CatalogueSection
+    >>> from exugear.system.bearings.rolling.catalogue import catalogue_rows
+    >>> from exugear.system.bearings.rolling.rows import BearingOfRows
+    >>> section = CatalogueSection(type="cylindrical_roller", bore_mm=100.0, outer_diameter_mm=180.0, width_mm=46.0)
+    >>> stiffness = pitch_averaged_tangent(BearingOfRows(catalogue_rows(section)), (33.5e3, 0.0, 0.0))
     >>> float(round(stiffness[0, 0] / 1e9, 1))
     1.9
     """

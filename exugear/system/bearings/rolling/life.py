@@ -126,7 +126,19 @@ def reference_life(
     for row, load in zip(rows, loads, strict=True):
         if is_rib(row):
             continue
-        stressed = _stress_loads(row, load)
+        # Balls count as one lamina, rollers with their edge stress.
+        stressed = np.asarray(load, dtype=np.float64)
+        wanted = "(elements, laminae)" if isinstance(row, RollerRow) else "(elements,)"
+        fits = stressed.ndim == 2 if isinstance(row, RollerRow) else stressed.shape[1:] in ((), (1,))
+        if not fits or stressed.size == 0 or len(stressed) % row.element_count:
+            raise BearingError(
+                f"reference life: loads of shape {stressed.shape} for a row of {row.element_count} elements; specify "
+                f"{wanted}"
+            )
+        stressed = stressed.reshape(len(stressed), -1)
+        if not np.all(np.isfinite(stressed)) or np.any(stressed < 0.0):
+            raise BearingError("reference life: loads of rolling elements must be finite and not negative")
+        stressed = stressed * edge_stress_factors(stressed.shape[1])
         capacities = _ring_capacities(row, row_rating, bearing_type)
         share = stressed.shape[1] ** (-7.0 / 9.0)
         for capacity, power in zip(capacities, (inner, outer), strict=True):
@@ -164,22 +176,6 @@ def life_in_hours(millions_of_revolutions: float, speed: float) -> float:
 def minimum_load(dynamic_rating: float, bearing_type: BearingType) -> float:
     """Load, N, below which rolling elements may slide instead of roll: a usual rule, 0.02 C_r or, balls, 0.01 C_r."""
     return (0.02 if bearing_type.endswith("_roller") else 0.01) * dynamic_rating
-
-
-def _stress_loads(row: RollingRow, load: Floats) -> Floats:
-    """Return the loads that count, (elements, laminae): balls as one lamina, rollers with their edge stress."""
-    stressed = np.asarray(load, dtype=np.float64)
-    wanted = "(elements, laminae)" if isinstance(row, RollerRow) else "(elements,)"
-    fits = stressed.ndim == 2 if isinstance(row, RollerRow) else stressed.shape[1:] in ((), (1,))
-    if not fits or stressed.size == 0 or len(stressed) % row.element_count:
-        raise BearingError(
-            f"reference life: loads of shape {stressed.shape} for a row of {row.element_count} elements; specify "
-            f"{wanted}"
-        )
-    stressed = stressed.reshape(len(stressed), -1)
-    if not np.all(np.isfinite(stressed)) or np.any(stressed < 0.0):
-        raise BearingError("reference life: loads of rolling elements must be finite and not negative")
-    return stressed * edge_stress_factors(stressed.shape[1])
 
 
 def _ring_capacities(row: RollingRow, row_rating: float, bearing_type: BearingType) -> tuple[float, float]:

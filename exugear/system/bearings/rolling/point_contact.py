@@ -379,23 +379,22 @@ def roller_table(row: RollerRow) -> RollerTable:
     tilts = MOST_TILT_OF_TABLE * (np.arange(count + 1) / count) ** 2
     # An aligning roller is never tilted: both ends of its only strip are the same.
     at = np.zeros(2) if row.aligning else tilts
-    onset, slope = _first_contact(row, at, ROUNDING * depth)
+    # Minimum of gap and tilt times position over the roller's length. A slight crown, whose height is subtracted again,
+    # keeps it smooth for rollers without a crown, so that forces are continuous at zero tilt.
+    height = 0.0 if _is_crowned(row) else (ROUNDING * depth)
+    share = np.linspace(-1.0, 1.0, 8001)[1:-1]
+    place = 0.5 * row.effective_length * share
+    gaps = 2.0 * row.drop(place) + height * share**2 + np.outer(at, place)
+    least = gaps.argmin(axis=1)
+    slope: Floats = place[least]
+    slope[0] = 0.0
+    onset, slope = gaps.min(axis=1) - height, slope
     most_depth = 1.2 * depth + 4.0 * row.profile_factor * row.element_diameter + float(onset[0] - onset[-1])
     roots = math.sqrt(most_depth) * np.arange(steps + 1) / steps
     nodes = np.stack([_nodes(row, roots, *line) for line in zip(at, onset, slope, strict=True)], axis=1)
     width = np.diff(tilts)
     cubics = HERMITE @ np.stack([onset[:-1], slope[:-1] * width, onset[1:], slope[1:] * width])
-    return RollerTable(
-        strips=np.column_stack([cubics.T, tilts[:-1], 1.0 / width]),
-        patches=_patches(nodes, width),
-        gaps=2.0 * row.drop(_slice_positions(row)[SLICES // 2 :]),
-        most_tilt=float(tilts[-1]),
-        most_depth=most_depth,
-    )
-
-
-def _patches(nodes: Floats, width: Floats) -> Floats:
-    """Coefficients (m, n, 4, 4), powers of the tilt first, from nodes (m + 1, n + 1, 2, 2) likewise."""
+    # Coefficients, powers of the tilt first, from nodes likewise.
     scaled = np.zeros((len(nodes) - 1, len(width), 2, 2, 2, 2))
     for i in range(2):
         for j in range(2):
@@ -403,7 +402,13 @@ def _patches(nodes: Floats, width: Floats) -> Floats:
     scaled[:, :, :, 1] *= width[:, None, None, None]
     ends = scaled.reshape(len(nodes) - 1, len(width), 4, 4)
     patches: Floats = HERMITE @ ends @ HERMITE.T
-    return patches
+    return RollerTable(
+        strips=np.column_stack([cubics.T, tilts[:-1], 1.0 / width]),
+        patches=patches,
+        gaps=2.0 * row.drop(_slice_positions(row)[SLICES // 2 :]),
+        most_tilt=float(tilts[-1]),
+        most_depth=most_depth,
+    )
 
 
 def _is_crowned(row: RollerRow) -> bool:
@@ -415,22 +420,6 @@ def _slice_positions(row: RollerRow) -> Floats:
     """Middles of the slices along a roller, m."""
     along: Floats = ((np.arange(SLICES) + 0.5) / SLICES - 0.5) * row.effective_length
     return along
-
-
-def _first_contact(row: RollerRow, tilts: Floats, rounding: float) -> tuple[Floats, Floats]:
-    """Return a bound (m) below the approach at first contact of a roller, and its derivative, at each tilt.
-
-    Minimum of gap and tilt times position over the roller's length. A slight crown, whose height is subtracted again,
-    keeps it smooth for rollers without a crown, so that forces are continuous at zero tilt.
-    """
-    height = 0.0 if _is_crowned(row) else rounding
-    share = np.linspace(-1.0, 1.0, 8001)[1:-1]
-    place = 0.5 * row.effective_length * share
-    gaps = 2.0 * row.drop(place) + height * share**2 + np.outer(tilts, place)
-    least = gaps.argmin(axis=1)
-    slope: Floats = place[least]
-    slope[0] = 0.0
-    return gaps.min(axis=1) - height, slope
 
 
 def _nodes(row: RollerRow, roots: Floats, tilt: float, onset: float, slope: float) -> Floats:

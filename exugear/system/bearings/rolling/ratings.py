@@ -126,9 +126,11 @@ def basic_dynamic_rating(rows: Sequence[RollingRow], bearing_type: BearingType) 
         size = length * row.element_count**0.75 * diameter ** (29.0 / 27.0)
         return float(MATERIAL_FACTOR[bearing_type] * line_contact_factor(row.diameter_ratio) * size)
     size = diameter**1.8 if diameter <= LARGE_BALL else 3.647 * diameter**1.4
-    factor = point_contact_factor(
-        row.diameter_ratio, *_dynamic_conformities(row, bearing_type), _ball_reduction(bearing_type, count)
-    )
+    # The table of f_c covers outer grooves up to 0.53 by its values for 0.52.
+    inner, outer = _static_conformities(row, bearing_type)
+    if bearing_type != "self_aligning_ball":
+        outer -= OUTER_CONFORMITY - INNER_CONFORMITY
+    factor = point_contact_factor(row.diameter_ratio, inner, outer, _ball_reduction(bearing_type, count))
     size *= (count * cosine) ** 0.7 * row.element_count ** (2.0 / 3.0)
     return float(MATERIAL_FACTOR[bearing_type] * factor * size)
 
@@ -168,10 +170,7 @@ def basic_static_rating(rows: Sequence[RollingRow], bearing_type: BearingType) -
         return 220.0 * (1.0 - row.diameter_ratio) * loaded * 1e3 * row.effective_length * diameter
     if isinstance(row, RollerRow):
         return 44.0 * (1.0 - row.diameter_ratio) * elements * 1e3 * row.effective_length * diameter
-    pressure = 4600.0 if bearing_type == "self_aligning_ball" else 4200.0
-    return (
-        static_factor(row.diameter_ratio, *_static_conformities(row, bearing_type), pressure) * elements * diameter**2
-    )
+    return row_static_factor(row, bearing_type) * elements * diameter**2
 
 
 def equivalent_load(
@@ -311,12 +310,6 @@ def _static_conformities(row: BallRow, bearing_type: BearingType) -> tuple[float
     if bearing_type == "self_aligning_ball":
         return max(inner, SELF_ALIGNING_CONFORMITY), outer
     return max(inner, INNER_CONFORMITY), max(outer, OUTER_CONFORMITY)
-
-
-def _dynamic_conformities(row: BallRow, bearing_type: BearingType) -> tuple[float, float]:
-    """Return the same for f_c, whose table covers outer grooves up to 0.53 by its values for 0.52."""
-    inner, outer = _static_conformities(row, bearing_type)
-    return inner, outer if bearing_type == "self_aligning_ball" else outer - (OUTER_CONFORMITY - INNER_CONFORMITY)
 
 
 def _ball_load(across: float, along: float, pressure: float) -> float:

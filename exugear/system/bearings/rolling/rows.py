@@ -2,8 +2,6 @@
 
 Frame: origin at the middle of the bearing, z along its axis; coordinates
 ``(u_x, u_y, u_z, theta_x, theta_y, theta_z)`` of the inner ring relative to the outer ring, SI units.
-
-Dimensions missing in a catalogue are estimated from the boundary dimensions by the usual proportions of the design.
 """
 
 from __future__ import annotations
@@ -11,11 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 
-from exugear.system.bearings.rolling.dimensions import PROPORTIONS, ROLLER_LENGTH, element_count, standard_profile
 from fe_ste.tools.arrays import Floats
 
 LINE_CONTACT_CONSTANT = 35948.0e6
@@ -281,165 +278,3 @@ def _approached(row: Row, approach: float) -> Row:
     turned = math.asin(sine)
     clearance = row.radial_clearance + 2.0 * row.groove_distance * (math.cos(turned) - math.cos(angle))
     return replace(row, contact_angle=math.copysign(turned, row.contact_angle), radial_clearance=clearance)
-
-
-@dataclass(frozen=True, kw_only=True)
-class CylindricalRollerBearing:
-    """Single-row cylindrical roller bearing from its boundary dimensions.
-
-    Dimensions missing in the catalogue are estimated from the boundary dimensions: roller diameter ``0.27 (D - d)``,
-    effective length ``0.64 B``, and as many rollers as fit on the pitch circle at a pitch of 1.15 roller diameters
-    (with a cage) or 1.01 (full complement); see `exugear.system.bearings.rolling.dimensions`.
-
-    Parameters
-    ----------
-    radial_clearance, laminae
-        See `RollerRow`.
-
-    Examples
-    --------
-    >>> bearing = CylindricalRollerBearing(bore=0.160, outside_diameter=0.290, width=0.080)
-    >>> bearing.rows[0].element_count
-    17
-    """
-
-    bore: float
-    outside_diameter: float
-    width: float
-    """Boundary dimensions d, D, B, m."""
-    full_complement: bool = False
-    """Without a cage."""
-    element_diameter: float | None = None
-    effective_length: float | None = None
-    element_count: int | None = None
-    """Replace the estimates where they are known."""
-    radial_clearance: float = 0.0
-    profile_factor: float | None = None
-    """See `RollerRow`; by default the standard profile of ISO/TS 16281."""
-    laminae: int = LAMINAE
-
-    def __post_init__(self) -> None:
-        """Check the boundary dimensions and the row that follows from them."""
-        _check_boundary_dimensions(self.bore, self.outside_diameter, self.width)
-        _ = self.rows
-
-    @property
-    def rows(self) -> tuple[RollerRow, ...]:
-        """The one row, in the middle of the bearing."""
-        return (_row_from_catalogue("cylindrical_roller", self, 0.0),)
-
-
-@dataclass(frozen=True, kw_only=True)
-class TaperedRollerBearing:
-    """Single-row tapered roller bearing from its boundary dimensions.
-
-    The pressure line is taken at the one contact angle that catalogues state (outer raceway); the rib is
-    left out. Used alone, the bearing holds an inner ring that is pushed towards +z; turn it by a negative
-    `contact_angle` or combine two in a `BearingPair`.
-
-    Examples
-    --------
-    >>> import math
-    >>> bearing = TaperedRollerBearing(
-    ...     bore=0.160, outside_diameter=0.240, width=0.051, contact_angle=math.radians(17.0)
-    ... )
-    >>> round(1e3 * bearing.rows[0].element_diameter, 1)
-    21.6
-    """
-
-    bore: float
-    outside_diameter: float
-    width: float
-    """Boundary dimensions d, D, T, m."""
-    contact_angle: float
-    """Nominal contact angle, rad, signed as in `RollerRow`."""
-    full_complement: bool = False
-    element_diameter: float | None = None
-    effective_length: float | None = None
-    element_count: int | None = None
-    """As in `CylindricalRollerBearing`."""
-    radial_clearance: float = 0.0
-    profile_factor: float | None = None
-    laminae: int = LAMINAE
-    """As in `CylindricalRollerBearing`."""
-
-    def __post_init__(self) -> None:
-        """Check the boundary dimensions and the row that follows from them."""
-        _check_boundary_dimensions(self.bore, self.outside_diameter, self.width)
-        if self.contact_angle == 0.0:
-            raise BearingError("tapered roller bearing: contact_angle = 0 is a cylindrical roller bearing")
-        _ = self.rows
-
-    @property
-    def rows(self) -> tuple[RollerRow, ...]:
-        """The one row, in the middle of the bearing."""
-        return (_row_from_catalogue("tapered_roller", self, self.contact_angle),)
-
-
-@dataclass(frozen=True, kw_only=True)
-class BearingPair:
-    """Two equal bearings next to each other on one shaft and in one housing, as one bearing.
-
-    Examples
-    --------
-    >>> import math
-    >>> taper = TaperedRollerBearing(
-    ...     bore=0.160, outside_diameter=0.240, width=0.051, contact_angle=math.radians(17.0)
-    ... )
-    >>> pair = BearingPair(bearing=taper, arrangement="X")
-    >>> [row.contact_angle > 0.0 for row in pair.rows]
-    [False, True]
-    """
-
-    bearing: CylindricalRollerBearing | TaperedRollerBearing
-    """One of the two."""
-    arrangement: Literal["X", "O", "tandem"]
-    """X (face to face): pressure lines meet the axis towards the middle of the pair. O (back to back): away from it,
-    stiff against tilting. Tandem: both rows take the same direction; also right for cylindrical rollers, where the
-    three are the same."""
-    row_distance: float | None = None
-    """Distance of the middles of the rows, m; by default the width of one bearing (mounted face to face)."""
-    axial_preload: float = 0.0
-    """Approach of the two rows along the axis against line-to-line contact, m; negative: axial clearance."""
-
-    def __post_init__(self) -> None:
-        """Refuse distances and arrangements that do not exist."""
-        _ = self.rows
-
-    @property
-    def rows(self) -> tuple[RollerRow, ...]:
-        """The row at -z, then the row at +z."""
-        (row,) = self.bearing.rows
-        distance = self.bearing.width if self.row_distance is None else self.row_distance
-        return pair_rows(row, self.arrangement, distance, self.axial_preload)
-
-
-def _check_boundary_dimensions(bore: float, outside_diameter: float, width: float) -> None:
-    if not 0.0 < bore < outside_diameter:
-        raise BearingError(f"bearing: bore = {bore} m must lie between 0 and outside_diameter = {outside_diameter} m")
-    if not width > 0.0:
-        raise BearingError(f"bearing: width = {width} m must be positive")
-
-
-def _row_from_catalogue(kind: str, bearing: CylindricalRollerBearing | TaperedRollerBearing, angle: float) -> RollerRow:
-    """Fill what the catalogue leaves open with the usual proportions of the type."""
-    usual = PROPORTIONS[kind]
-    pitch_diameter = 0.5 * (bearing.bore + bearing.outside_diameter)
-    diameter = bearing.element_diameter or usual.diameter.value * (bearing.outside_diameter - bearing.bore)
-    length = bearing.effective_length or ROLLER_LENGTH[kind].value * bearing.width
-    estimated = element_count(kind, diameter / pitch_diameter, usual.spacing.value, bearing.full_complement)
-    factor, straight = standard_profile(kind, diameter, length)
-    if bearing.profile_factor is not None:
-        factor = bearing.profile_factor
-        straight = 0.0
-    return RollerRow(
-        element_diameter=diameter,
-        effective_length=length,
-        pitch_diameter=pitch_diameter,
-        element_count=bearing.element_count or estimated,
-        contact_angle=angle,
-        radial_clearance=bearing.radial_clearance,
-        profile_factor=factor,
-        straight_share=straight,
-        laminae=bearing.laminae,
-    )

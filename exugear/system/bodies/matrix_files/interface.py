@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin
@@ -189,12 +190,16 @@ class InterfaceMatrices(ReprMixin, line=": {nodes!n} interface nodes, {modal!n} 
 
     def rigid_motions(self, centre: Sequence[float] | Floats) -> Floats:
         """Rigid motions (n, 6): translations, and rotations about a centre (3,)."""
-        motions = np.zeros((self.size, NODE_SIZE))
-        for n, position in enumerate(self.positions):
-            x, y, z = position - np.asarray(centre)
-            motions[6 * n : 6 * n + 6] = np.eye(6)
-            motions[6 * n : 6 * n + 3, 3:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
-        return motions
+        return rigid_motions(self.size, self.positions, centre)
+
+
+def rigid_motions(size: int, positions: ArrayLike, centre: ArrayLike) -> Floats:
+    """Return translations, and rotations about a centre (3,), as motions (size, 6) of nodes at positions (s, 3)."""
+    motions = np.zeros((size, NODE_SIZE))
+    for n, (x, y, z) in enumerate(np.reshape(positions, (-1, 3)) - np.asarray(centre)):
+        motions[6 * n : 6 * n + 6] = np.eye(6)
+        motions[6 * n : 6 * n + 3, 3:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
+    return motions
 
 
 def check_size(count: int, path: object, name: str) -> None:

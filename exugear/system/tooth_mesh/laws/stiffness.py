@@ -93,7 +93,15 @@ def pack(
     stiffness = np.zeros((count, width, max((values.shape[1] for _, values in forms), default=4)))
     for block, (_, values) in zip(stiffness, forms, strict=True):
         block[: len(values), : values.shape[1]] = values
-    index = _indices(elements, coordinates)
+    # Position of each local coordinate of each mesh in the state.
+    index = np.full((len(elements), ROW_SIZE), -1, dtype=np.int64)
+    for row, element in zip(index, elements, strict=True):
+        mesh = element.mesh
+        for start, body, gear in ((0, mesh.pinion, mesh.pair.pinion), (BODY_SIZE, mesh.gear, mesh.pair.gear)):
+            keys = (seat_key(body, mesh.name), seat_key(body, gear.name), body)  # a travelling seat, a seat, the body
+            carrying = (coordinates[key] for key in keys if key in coordinates)
+            row[start : start + BODY_SIZE] = next(carrying, _NO_COORDINATES)
+        row[FRAME] = coordinates.get(mesh.frame, _NO_COORDINATES)[SPIN]
     tilts = _pack_tilts(elements, index, linear)
     # Its mean is in the lever; of gears that do not tilt it does nothing.
     resists = tilts[:, TILT_STIFFNESS] > 0.0
@@ -159,19 +167,6 @@ def _pack_tilts(elements: tuple[MeshElement, ...], index: Integers, linear: bool
         moment = contact.force * (contact.load_centroid - lever)
         row[:] = stiffness, element.damping_time * stiffness, lever, moment, contact.misalignment
     return tilts
-
-
-def _indices(elements: tuple[MeshElement, ...], coordinates: Mapping[str, tuple[int, ...]]) -> Integers:
-    """Position of each local coordinate of each mesh in the state, (m, 13)."""
-    index = np.full((len(elements), ROW_SIZE), -1, dtype=np.int64)
-    for row, element in zip(index, elements, strict=True):
-        mesh = element.mesh
-        for start, body, gear in ((0, mesh.pinion, mesh.pair.pinion), (BODY_SIZE, mesh.gear, mesh.pair.gear)):
-            keys = (seat_key(body, mesh.name), seat_key(body, gear.name), body)  # a travelling seat, a seat, the body
-            carrying = (coordinates[key] for key in keys if key in coordinates)
-            row[start : start + BODY_SIZE] = next(carrying, _NO_COORDINATES)
-        row[FRAME] = coordinates.get(mesh.frame, _NO_COORDINATES)[SPIN]
-    return index
 
 
 def _pack_ways(elements: tuple[MeshElement, ...], ways: list[Floats]) -> Floats:

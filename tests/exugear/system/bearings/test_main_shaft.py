@@ -12,7 +12,6 @@ import scipy.linalg
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.system.bearings.rolling.contact import pitch_averaged_tangent
-from exugear.system.bearings.rolling.rows import BearingPair, TaperedRollerBearing
 from exugear.system.bearings.stiffness import axially_symmetric
 from exugear.system.bodies.of_gearbox import shaft_model
 from exugear.system.bodies.reduction import ReducedBody
@@ -27,6 +26,8 @@ from exugear.transient.exudyn_model.system import ExudynSystem
 
 from ...cases.assembled import assembled, modes_with_bodies
 from ...cases.plain_motion import accelerations_of
+from ...cases.reduced import first_coordinate
+from ...cases.roller_bearings import BearingPair, TaperedRollerBearing
 
 TORQUE = {"main_shaft": 240e3}
 YOUNG, SHEAR, DENSITY = 206e9, 206e9 / 2.6, 7850.0
@@ -115,9 +116,9 @@ def test_the_rotor_on_its_bearings_nods_as_on_a_beam(model: ShaftModel, reduced:
     free = [n for n in range(len(mass)) if n not in (at["shrink_disc"], at["shrink_disc"] + 1)]
     expected = frequencies(mass[np.ix_(free, free)], stiffness[np.ix_(free, free)])[:2]
     held = reduced.stiffness.copy()
-    across = reduced.first_coordinate("main_bearing")
+    across = first_coordinate(reduced, "main_bearing")
     held[across, across] += MAIN_BEARING
-    clamp = reduced.first_coordinate("shrink_disc")
+    clamp = first_coordinate(reduced, "shrink_disc")
     plane = next(block for block in reduced.blocks if across in block)
     left = [n for n in plane if n not in range(clamp, clamp + 6)]
     found = frequencies(reduced.mass[np.ix_(left, left)], held[np.ix_(left, left)])[:2]
@@ -136,7 +137,7 @@ def twist_per_torque(model: ShaftModel) -> float:
 
 
 def test_the_shaft_winds_up_as_its_sections_say(reduced: ReducedBody, model: ShaftModel, with_shaft: Gearbox) -> None:
-    hub, disc = (reduced.first_coordinate(seat) + 5 for seat in ("torque", "shrink_disc"))
+    hub, disc = (first_coordinate(reduced, seat) + 5 for seat in ("torque", "shrink_disc"))
     free = [n for n in next(block for block in reduced.blocks if hub in block) if n != disc]
     load = np.array([float(n == hub) for n in free])
     wound = np.linalg.solve(reduced.stiffness[np.ix_(free, free)], load)[free.index(hub)]

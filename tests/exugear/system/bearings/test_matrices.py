@@ -8,18 +8,15 @@ import numpy as np
 import pytest
 
 from exugear.system.bearings.rolling.contact import pitch_averaged_tangent
-from exugear.system.bearings.rolling.rows import (
-    BearingError,
-    BearingPair,
-    CylindricalRollerBearing,
-    TaperedRollerBearing,
-)
+from exugear.system.bearings.rolling.rows import BearingError
 from exugear.system.bearings.stiffness import (
     axially_symmetric,
     proportional_damping,
     regularised,
     rotate_stiffness,
 )
+
+from ...cases.roller_bearings import BearingPair, CylindricalRollerBearing, TaperedRollerBearing
 
 NJ2232 = CylindricalRollerBearing(bore=0.160, outside_diameter=0.290, width=0.080)
 PAIR = BearingPair(

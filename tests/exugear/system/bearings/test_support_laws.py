@@ -10,7 +10,6 @@ import pytest
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.sections.connections import CatalogueSection
 from exugear.system.bearings.rolling.contact import pitch_averaged_tangent
-from exugear.system.bearings.rolling.rows import BearingPair, CylindricalRollerBearing
 from exugear.system.bearings.stiffness import (
     axially_symmetric,
     cage_ratio,
@@ -20,6 +19,7 @@ from exugear.system.bearings.stiffness import (
 )
 
 from ...cases.bearing import bearing_gearbox
+from ...cases.roller_bearings import BearingPair, CylindricalRollerBearing
 
 SECTION = CatalogueSection(
     type="cylindrical_roller",

@@ -22,6 +22,7 @@ from ....optional_libraries import needs_meshio
 from ...cases.assembled import assembled, simulated
 from ...cases.plain_motion import accelerations_of
 from ...cases.plain_signals import energies_of, sampled
+from ...cases.reduced import first_coordinate
 from ...cases.ring import ring_content
 from ...cases.rounding import allowed_difference
 from ...cases.stated_loads import STATED_LOADS
@@ -89,7 +90,7 @@ def test_the_ring_winds_up_between_its_flanges(ringed: Assembly, stage: Gearbox)
     torque = 240e3 * 99.0 / 120.0  # z_ring / (z_sun + z_ring)
     place = ringed.elastic_slices["housing"].start
     reduced = ringed.elastic_bodies["housing"].reduced
-    flanges = [q[place + reduced.first_coordinate(name) + 5] for name in ("front", "rear")]
+    flanges = [q[place + first_coordinate(reduced, name) + 5] for name in ("front", "rear")]
     assert 1e9 * np.sum(flanges) == pytest.approx(torque, rel=1e-6)
     assert 1e9 * np.array(flanges) == pytest.approx([torque / 2.0, torque / 2.0], rel=2e-3)
 

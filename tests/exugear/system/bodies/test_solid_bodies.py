@@ -37,6 +37,7 @@ from ...cases.box import box_content
 from ...cases.limit import unchecked
 from ...cases.plain_motion import accelerations_of
 from ...cases.plain_signals import sampled
+from ...cases.reduced import first_coordinate
 
 pytestmark = needs_meshio
 
@@ -282,7 +283,7 @@ def test_the_grc_stands_on_its_mounts_with_elastic_housing(grc: Gearbox, stiffne
     # The published finite-element analysis of the real rear housing has tilts of 0.12 to 0.54 mrad at 401 kN m.
     housing, place = assembly.elastic_bodies["housing"].reduced, assembly.elastic_slices["housing"]
     tilts = [
-        np.hypot(*q[place][housing.first_coordinate(name) + 3 : housing.first_coordinate(name) + 5])
+        np.hypot(*q[place][first_coordinate(housing, name) + 3 : first_coordinate(housing, name) + 5])
         for name in ("lss_bc", "ims_bc", "hss_bc")
     ]
     assert 1e-4 < max(tilts) < 1e-3

@@ -15,7 +15,7 @@ from exugear.system.bearings.rolling.contact import (
     tangent_stiffness,
 )
 from exugear.system.bearings.rolling.point_contact import rolling_arrays
-from exugear.system.bearings.rolling.rows import BearingError, BearingPair, RollerRow, RollingRow, TaperedRollerBearing
+from exugear.system.bearings.rolling.rows import BearingError, RollerRow, RollingRow
 from exugear.system.kernels.rolling import (
     CAGE_DAMPING,
     CAGE_TORQUE,
@@ -32,6 +32,7 @@ from exugear.system.kernels.rolling import (
     selected_rolling,
 )
 
+from ...cases.roller_bearings import BearingPair, TaperedRollerBearing
 from ...cases.rolling import BALLS, CYLINDRICAL, TAPERED, plain_energy_and_load
 
 NEEDLES = RollerRow(

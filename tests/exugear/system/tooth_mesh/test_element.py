@@ -17,7 +17,7 @@ from exugear.system.tooth_mesh.element import mesh_elements
 from exugear.system.tooth_mesh.laws.mesh_forces import add_mesh_forces, mesh_state
 from exugear.system.tooth_mesh.laws.registry import LAWS as ALL_LAWS
 from exugear.system.tooth_mesh.laws.registry import law_of
-from exugear.system.tooth_mesh.placement import MeshError, MeshGeometry, loaded_flanks, mesh_phases
+from exugear.system.tooth_mesh.placement import MeshError, MeshGeometry, loaded_flanks, tooth_places
 
 from ...cases.assembled import assembled
 
@@ -182,7 +182,7 @@ def test_force_directions_for_both_hands_and_flanks(
 
 def test_equally_spaced_planets_are_in_phase(grc: Gearbox) -> None:
     # 21 and 99 teeth are multiples of 3 (published: all planets in phase).
-    phases = mesh_phases(grc, loaded_flanks(grc))
+    phases = tooth_places(grc, loaded_flanks(grc))[0]
     for stage in ("sun_planet", "ring_planet"):
         values = [phases[f"{stage}_{number}"] for number in (1, 2, 3)]
         assert max(abs(math.remainder(value - values[0], 1.0)) for value in values) < 1e-12
@@ -191,7 +191,7 @@ def test_equally_spaced_planets_are_in_phase(grc: Gearbox) -> None:
 def test_shifted_planet_is_shifted_in_phase_by_the_sun_teeth(grc: Gearbox) -> None:
     # Sequential positions of the published phasing study: multiples of 3 degrees at 0, 42 and 84.
     gearbox = grc.varied({"bodies.planet.planet_angles_deg": [0.0, 126.0, 252.0]})
-    phases = mesh_phases(gearbox, loaded_flanks(gearbox))
+    phases = tooth_places(gearbox, loaded_flanks(gearbox))[0]
     flank = loaded_flanks(gearbox)["sun_planet_1"]
     for number, angle in ((2, 126.0), (3, 252.0)):
         shift = phases[f"sun_planet_{number}"] - phases["sun_planet_1"]
@@ -201,7 +201,7 @@ def test_shifted_planet_is_shifted_in_phase_by_the_sun_teeth(grc: Gearbox) -> No
 
 def test_phase_between_sun_and_ring_follows_from_the_planets_tooth_thickness(grc: Gearbox) -> None:
     """One planet tooth flank drives the sun, the other is driven by the ring, half a turn away."""
-    phases = mesh_phases(grc, loaded_flanks(grc))
+    phases = tooth_places(grc, loaded_flanks(grc))[0]
     planet, sun, ring = grc.gears["planet"], grc.gears["sun"], grc.gears["ring"]
     assert (sun.teeth, ring.teeth) == (21, 99)
     # 39 teeth: from the ring's pitch point to the sun's are 19.5 pitches; the tooth between the two flanks

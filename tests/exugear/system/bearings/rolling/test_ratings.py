@@ -13,13 +13,9 @@ from exugear.system.bearings.rolling.ratings import (
     row_count,
     static_factor,
 )
-from exugear.system.bearings.rolling.rows import (
-    BallRow,
-    BearingError,
-    CylindricalRollerBearing,
-    RollerRow,
-    TaperedRollerBearing,
-)
+from exugear.system.bearings.rolling.rows import BallRow, BearingError, RollerRow
+
+from ....cases.roller_bearings import CylindricalRollerBearing, TaperedRollerBearing
 
 
 def balls(diameter, pitch, count, degrees=0.0, **options):
