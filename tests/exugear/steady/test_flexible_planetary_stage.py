@@ -291,14 +291,26 @@ def test_methods_without_the_variation_of_the_ring_are_refused_by_name(drum, met
         response_of(drum, SteadySettings(SpeedRange(*RANGE, 2), method))
 
 
-@pytest.mark.long
-def test_a_run_of_the_grc_with_all_bodies_flexible_stays_on_its_steady_state(grc, stiffness):
-    """RK4 at 1/96 kHz, 336 coordinates. Passing planets, 43 um at three times the carrier's order, are the largest."""
+@pytest.fixture(scope="module")
+def whole(grc, stiffness):
+    """Solver of the GRC with all bodies flexible, 336 coordinates."""
     assembly = assembled(grc, Choice("flexible"), stiffness)
-    solver = solver_of(assembly, (9.0, 11.0), "parametric", 12, 2)
-    lines = solver.model.lines
-    overall = 2.0 * np.abs(signals(solver.model, solver.response(10.0))[1:, 0])
-    assert lines.orders[1:][np.argmax(overall)] == pytest.approx(3.0)
-    complex_error, amplitude_error = apart(solver, 10.0, 1.5, 1.04e-5, 0.9, solver.model.waves.assembly)
-    assert amplitude_error < 2e-3
-    assert complex_error < 4e-3
+    return solver_of(assembly, (4.0, 22.5), "parametric", 12, 2)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("speed", "most"),
+    [(speed, 2.5e-3) for speed in (4.3, 6.0, 8.2, 10.0, 12.4, 14.1, 16.0, 20.1, 22.0)] + [(18.3, 6e-3)],
+)
+def test_runs_of_the_grc_with_all_bodies_flexible_stay_on_their_steady_state(whole, speed, most):
+    """RK4 at 1/96 kHz. Amplitudes of all orders of the overall error together, over their size.
+
+    At 18.3 rad/s the first order of the planetary stage excites a mode of 0.7 % damping to 0.7 mm, so that what is of
+    second order counts more. At most other speeds passing planets, 43 um at three times the carrier's order, are the
+    largest.
+    """
+    assert apart(whole, speed, 1.5, 1.04e-5, 0.9, whole.model.waves.assembly)[1] < most
+    if speed == 10.0:
+        overall = 2.0 * np.abs(signals(whole.model, whole.response(speed))[1:, 0])
+        assert whole.model.lines.orders[1:][np.argmax(overall)] == pytest.approx(3.0)
