@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
@@ -196,14 +196,7 @@ def _render_contact(
         lift = 2e-3 * float(np.ptp(pinion.points, axis=0).max()) * direction
         patch = _quad_surface(quads + lift)
         patch.cell_data["pressure"] = pressure
-        plotter.add_mesh(
-            patch,
-            scalars="pressure",
-            clim=(0.0, top),
-            cmap=_PRESSURE_MAP,
-            lighting=False,
-            show_scalar_bar=False,
-        )
+        _add_unlit(plotter, patch, "pressure", top, _PRESSURE_MAP)
         focus = quads.mean(axis=(0, 1))
         plotter.camera_position = [focus + direction, focus, upward]
         plotter.renderer.ResetCamera()
@@ -224,6 +217,13 @@ def _chart_pressure(panel: Axes, quads: Floats, pressure: Floats, top: float) ->
     panel.autoscale_view()
     panel.set(xlabel="Face width z / mm", ylabel="Pinion radius / mm")
     return cells
+
+
+def _add_unlit(
+    plotter: pyvista.Plotter, mesh: pyvista.PolyData, name: str, top: float, colours: Literal["inferno_r", "turbo"]
+) -> None:
+    """Add a mesh in the colours of its values from zero to `top`, not shaded by light."""
+    plotter.add_mesh(mesh, scalars=name, clim=(0.0, top), cmap=colours, lighting=False, show_scalar_bar=False)
 
 
 def _quad_surface(quads: Floats) -> pyvista.PolyData:
@@ -536,14 +536,7 @@ def _flank_view(
         # Towards the eye by next to nothing, so that the pressure is not lost in the flank below it.
         patch = pyvista.PolyData(points + 0.01 * module * flank.normal, faces=facets.ravel())
         patch.point_data["pressure"] = 1e-6 * flank.pressure
-        plotter.add_mesh(
-            patch,
-            scalars="pressure",
-            clim=(0.0, 1e-6 * flank.top_pressure),
-            cmap=_PRESSURE_MAP,
-            lighting=False,
-            show_scalar_bar=False,
-        )
+        _add_unlit(plotter, patch, "pressure", 1e-6 * flank.top_pressure, _PRESSURE_MAP)
         width = float(np.ptp(flank.points[flank.facets, 2]))
         plotter.camera_position = [flank.middle + 10.0 * module * flank.normal, flank.middle, flank.upward]
         plotter.camera.parallel_scale = max(2.2 * module, 0.55 * width * size[1] / size[0])
@@ -561,14 +554,7 @@ def _section_view(
             grid = _grid(field, number, sector.hexahedra, 1.0)
             # A little beside the layer of nodes, where bricks are cut, not touched.
             cut = grid.slice(normal=(0.0, 0.0, 1.0), origin=(0.0, 0.0, point[2] + 1e-4 * module))
-            plotter.add_mesh(
-                cut,
-                scalars="stress",
-                clim=(0.0, top),
-                cmap=_STRESS_MAP,
-                lighting=False,
-                show_scalar_bar=False,
-            )
+            _add_unlit(plotter, cut, "stress", top, _STRESS_MAP)
             outline = cut.extract_feature_edges(boundary_edges=True, feature_edges=False, manifold_edges=False)
             plotter.add_mesh(outline, color="#222222", line_width=2.0)
         plotter.camera_position = [point + np.array([0.0, 0.0, module]), point, flank.upward]

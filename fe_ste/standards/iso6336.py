@@ -296,19 +296,6 @@ def resonance_speed(pair: GearPair, mesh_stiffness: float, mass: float) -> float
     return math.sqrt(mesh_stiffness / mass) / pair.pinion.teeth
 
 
-def resonance_ratio(
-    pair: GearPair, mesh_stiffness: float, speed: float, meshes: tuple[int, int] = (1, 1), ring_held: bool = True
-) -> float:
-    """N: speed of gear 1 against its frame (rad/s) over that of the main resonance.
-
-    Parameters
-    ----------
-    mesh_stiffness : c_gamma_alpha, N/m per m
-    meshes, ring_held : as in `reduced_mass`
-    """
-    return abs(speed) / resonance_speed(pair, mesh_stiffness, reduced_mass(pair, meshes, ring_held))
-
-
 def dynamic_factor(
     ratio: float,
     contact_ratio: float,
@@ -321,7 +308,7 @@ def dynamic_factor(
 
     Parameters
     ----------
-    ratio : N, see `resonance_ratio`
+    ratio : N, speed of gear 1 over `resonance_speed`
     contact_ratio : eps_gamma, the total one
     single_stiffness : c', N/m per m
     line_load : F_t K_A K_gamma over the face width, N/m

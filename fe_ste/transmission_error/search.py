@@ -70,7 +70,7 @@ def hertz_half_width(pair: GearPair, line_load: float) -> float:
 
 
 @lru_cache(maxsize=64)
-def least_contact_length(pair: GearPair, samples: int = 100) -> float:
+def least_contact_length(pair: GearPair) -> float:
     """Minimum total length of the contact lines over the mesh cycle, m."""
     axial = np.linspace(-0.5, 0.5, 401) * pair.face_width
     pitch = pair.transverse_base_pitch
@@ -78,7 +78,7 @@ def least_contact_length(pair: GearPair, samples: int = 100) -> float:
     lines = pair.path_pitch_point + math.tan(pair.pinion.base_helix_angle) * axial
     reach = math.ceil(pair.total_contact_ratio) + 1
     lines = lines + pitch * np.arange(-reach, reach + 1)[:, None]
-    shift = np.arange(samples)[:, None, None] / samples * pitch
+    shift = np.arange(100)[:, None, None] / 100 * pitch
     inside = (lines + shift > pair.path_start) & (lines + shift < pair.path_end)
     length = inside.mean(axis=2).sum(axis=1) * pair.face_width / math.cos(pair.pinion.base_helix_angle)
     return float(length.min())

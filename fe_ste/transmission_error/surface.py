@@ -424,10 +424,13 @@ class SteSurface(ReprMixin):
         start, end = self.root_force[piece : piece + 2]
         return float(cubic[piece, :4] @ ((root - start) / (end - start)) ** np.arange(4))
 
-    def mean_stiffness(self, force: float, centre_distance: float, misalignment: float = 0.0) -> float:
-        """Tangent stiffness dF/ds (N/m) of the mean over the mesh cycle at a force (N), at most the axis's last."""
+    def mean_stiffness(self, force: float, centre_distance: float) -> float:
+        """Tangent stiffness dF/ds (N/m) of the mean over the mesh cycle, of aligned gears.
+
+        It is that at a force, N; beyond the last node of the axis, that at the node.
+        """
         surface = self.averaged()
-        cubic = surface._cubics_at(0.0, centre_distance, misalignment)
+        cubic = surface._cubics_at(0.0, centre_distance, 0.0)
         root = min(np.sqrt(force), self.root_force[-1])
         piece = int(np.clip(np.searchsorted(self.root_force, root, side="right") - 1, 0, len(cubic) - 1))
         step = self.root_force[piece + 1] - self.root_force[piece]

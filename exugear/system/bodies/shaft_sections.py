@@ -166,10 +166,8 @@ def narrowed(sections: Sequence[ShaftSection], seat: SeatBand) -> SeatBand:
     return replace(seat, width=2.0 * half)
 
 
-def check_shaft(
-    sections: Sequence[ShaftSection], seats: Sequence[SeatBand], size: MeshSize = STANDARD_SIZE, start: float = 0.0
-) -> None:
-    """Refuse a shaft before it is meshed.
+def check_shaft(sections: Sequence[ShaftSection], seats: Sequence[SeatBand], start: float = 0.0) -> None:
+    """Refuse a shaft before it is meshed with elements of `STANDARD_SIZE`.
 
     Parameters
     ----------
@@ -185,7 +183,7 @@ def check_shaft(
         locate(sections, seat, start)
     length = sum(s.length for s in sections)
     radius = max(max(s.outer_diameter, s.outer_end) for s in sections) / 2.0
-    elements = length / size.axial * radius / size.radial
+    elements = length / STANDARD_SIZE.axial * radius / STANDARD_SIZE.radial
     if elements > MOST_ELEMENTS:
         raise ShaftError(
             f"a shaft of {length:g} m length and {2.0 * radius:g} m diameter requires {elements:.0f} elements over "

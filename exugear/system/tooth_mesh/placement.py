@@ -117,12 +117,12 @@ class ToothContact:
         return angle
 
 
-def loaded_flanks(gearbox: Gearbox, torques: Mapping[str, float] | None = None) -> dict[str, int]:
-    """Return the loaded flank s of each mesh under the static load, or under other torques with the same locks.
+def loaded_flanks(gearbox: Gearbox) -> dict[str, int]:
+    """Return the loaded flank s of each mesh under the static load.
 
     For a mesh without force, return the flank that drags the driven side along.
     """
-    forces = gearbox.train.static_mesh_forces(torques)
+    forces = gearbox.train.static_mesh_forces()
     if not all(forces.values()):
         dragged = gearbox.train.dragging_forces()
         forces = {name: force or dragged.get(name, 0.0) for name, force in forces.items()}

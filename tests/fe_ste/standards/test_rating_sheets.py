@@ -25,7 +25,6 @@ from fe_ste.standards.iso6336 import (
     mesh_stiffness,
     pitch_running_in,
     reduced_mass,
-    resonance_ratio,
     resonance_speed,
     transverse_load_factors,
 )
@@ -82,7 +81,7 @@ def dynamic_3() -> float:
         base_pitch=15.9e-6 - pitch_running_in(15.9e-6, "case_hardened", LIMIT, 20.83),
         profile_form=22e-6 - pitch_running_in(22e-6, "case_hardened", LIMIT, 20.83),
     )
-    ratio = resonance_ratio(STAGE_3, stiffness_3().mesh_stiffness, SPEED)
+    ratio = SPEED / resonance_speed(STAGE_3, stiffness_3().mesh_stiffness, reduced_mass(STAGE_3))
     return dynamic_factor(ratio, STAGE_3.total_contact_ratio, stiffness_3().single_stiffness, LINE_LOAD, effective)
 
 
@@ -136,7 +135,7 @@ PRINTED_3 = {
     "c_gamma_alpha": (lambda: 1e-9 * stiffness_3().mesh_stiffness, 18.632),
     "c_gamma_beta": (lambda: 1e-9 * stiffness_3().mesh_stiffness_for_load_distribution, 15.837),
     "m_red, kg/mm": (lambda: 1e-3 * reduced_mass(STAGE_3), 0.36503),
-    "n_E1, rpm": (lambda: 1165.9 / resonance_ratio(STAGE_3, stiffness_3().mesh_stiffness, SPEED), 2843.0),
+    "n_E1, rpm": (lambda: resonance_speed(STAGE_3, stiffness_3().mesh_stiffness, reduced_mass(STAGE_3)) / RPM, 2843.0),
     "K_V": (dynamic_3, 1.092),
     "K_Halpha": (lambda: transverse_3()[0], 1.069),
     "K_Falpha": (lambda: transverse_3()[1], 1.069),
@@ -251,7 +250,7 @@ def ring_notch() -> float:
 PRINTED_2 = {
     "c' of sun and planet": (lambda: 1e-9 * mesh_stiffness(sun_planet(), blank_factor=0.862).single_stiffness, 12.240),
     "m_red, kg/mm": (lambda: 1e-3 * reduced_mass(sun_planet(), (3, 1)), 0.1534),
-    "n_E1, rpm": (lambda: RPM**-1 / resonance_ratio(sun_planet(), 15.640e9, 1.0, (3, 1)), 5357.0),
+    "n_E1, rpm": (lambda: resonance_speed(sun_planet(), 15.640e9, reduced_mass(sun_planet(), (3, 1))) / RPM, 5357.0),
     "K_V of sun and planet": (dynamic_2, 1.02),
     "Z_B of the sun": (lambda: single_contact_factors(sun_planet())[0], 1.08),
     "Z_D of its planet": (lambda: single_contact_factors(sun_planet())[1], 1.00),
