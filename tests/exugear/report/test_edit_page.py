@@ -161,7 +161,8 @@ def test_results_of_an_earlier_text_stay_grey_while_there_is_an_error(view: Edit
 
 def test_keys_are_completed_with_their_meaning(view: EditView) -> None:
     view.type_over("held_diameter_mm = 90.0", 0, "\ntip_d")
-    view.page.wait_for_selector(".cm-tooltip-autocomplete >> text=tip_diameter_mm")
+    # The list is narrowed as the key is typed.
+    view.page.wait_for_selector(".cm-tooltip-autocomplete li:first-child:has-text('tip_diameter_mm')")
     assert "number; mm" in view.text(".cm-completionDetail >> nth=0")
     assert "diameter" in view.text(".cm-completionInfo")
     assert view.soon(lambda: "old" in str(view.page.get_attribute("[data-step=check]", "class")))
