@@ -32,7 +32,7 @@ from exugear.results.folder import (
 )
 from exugear.results.run_file import FINAL_NAME
 from exugear.results.solver_comparison import EXUDYN_FOLDER, SolverComparison, compare_solvers
-from exugear.steady.settings import Method, SteadySettings, usual_speeds
+from exugear.steady.settings import Method, SteadySettings, check_varying, usual_speeds
 from exugear.system.bearings.duty import BearingLoadState
 from exugear.system.bearings.rolling.rows import BearingError
 from exugear.system.bodies.elastic_body import ElasticBody
@@ -327,6 +327,7 @@ class Project(ReprMixin):
         assembly = self.assembly()
         if reason := unsuitable(assembly):
             raise SteadyError(reason)
+        check_varying(assembly, settings.method)
         choice = self.choice
         self.keep_case()
         with time_noted(self.folder, f"steady, {choice.variant}, {choice.inertias}, {choice.mesh_model}"):

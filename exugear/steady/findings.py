@@ -213,10 +213,8 @@ def _passing(data: xr.Dataset) -> Iterator[Finding]:
     left_out = float(data.attrs["neighbours_left_out"])
     passing = data["index"].to_numpy()[:, list(data["base"].to_numpy()).index(carrier)]
     count = int(np.count_nonzero(passing))
-    text = (
-        f"stiffness varies with the angle of {carrier}: {count} orders of passing planets and beside mesh orders are "
-    )
-    text += "included; those left out change the transmission error and the deflections of the meshes by at most "
+    text = f"stiffness varies with the angle of {carrier}: {count} orders of passing planets and beside mesh orders "
+    text += "are included; those left out change the transmission error and the deflections of the meshes by at most "
     text += f"{100.0 * left_out:.1g} %"
     yield Finding("warning" if left_out > NOTICED_NEIGHBOURS else "note", text, left_out)
     over_angle = data["mode_over_angle"].to_numpy()

@@ -20,7 +20,7 @@ from exugear.gearbox.load_cases import (
 )
 from exugear.gearbox.units import RPM
 from exugear.gearbox.versions import STEADY
-from exugear.steady.mean_system.planet_sets import SteadyError, planet_sets
+from exugear.steady.mean_system.planet_sets import SteadyError, unlike_families
 from exugear.system.system import Assembly, input_hash
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
@@ -199,6 +199,23 @@ def check_nonlinear(gearbox: Gearbox, method: Method) -> None:
         )
 
 
+def check_planets(gearbox: Gearbox, method: Method) -> None:
+    """Refuse methods that do not include planets which are not alike.
+
+    Raises
+    ------
+    SteadyError
+        Planets are fewer than three or unequally spaced, and the method is not ``parametric``.
+    """
+    families = unlike_families(gearbox.bodies())
+    if families and method != "parametric":
+        raise SteadyError(
+            f"bodies.{next(iter(families.values()))}: planets that are fewer than three or unequally spaced; the "
+            f"stiffness varies with the carrier angle, which the method {method} does not include; use --method "
+            "parametric with --mesh-model line_of_action, or exugear run"
+        )
+
+
 def check_varying(assembly: Assembly, method: Method) -> None:
     """Refuse methods that do not include stiffness that varies as the carrier turns.
 
@@ -207,16 +224,8 @@ def check_varying(assembly: Assembly, method: Method) -> None:
     SteadyError
         The ring gear is flexible, or planets are not alike, and the method is not ``parametric``.
     """
-    if method == "parametric":
-        return
-    if single := [planets for planets in planet_sets(assembly) if planets.is_single]:
-        family = assembly.gearbox.body(single[0].names[0]).family
-        raise SteadyError(
-            f"bodies.{family}: planets that are fewer than three or unequally spaced; the stiffness varies with the "
-            f"carrier angle, which the method {method} does not include; use --method parametric with --mesh-model "
-            "line_of_action, or exugear run"
-        )
-    if assembly.travelling.first.size:
+    check_planets(assembly.gearbox, method)
+    if assembly.travelling.first.size and method != "parametric":
         raise SteadyError(
             f"the ring gear is flexible, and its stiffness under the passing planets varies: the method {method} does "
             "not include that; use --method parametric with --mesh-model line_of_action, or exugear run"

@@ -33,7 +33,9 @@ from exugear.steady.settings import (
     SteadySettings,
     check_law,
     check_nonlinear,
+    check_planets,
     check_speeds,
+    check_varying,
     usual_speeds,
 )
 from exugear.system.modal_damping import damping_in_words
@@ -68,6 +70,7 @@ def settings_of_options(
     """Return the settings that the options state; raise an error if they are invalid for the project."""
     check_law(project.choice.mesh_model, method)
     check_nonlinear(project.gearbox, method)
+    check_planets(project.gearbox, method)
     check_speeds(project.gearbox, speeds)
     return SteadySettings(speeds, method, harmonics, branches=branches)
 
@@ -79,8 +82,10 @@ def steady(project: WatchedProject, settings: SteadySettings, quantity: str | No
     # A variant without steady-state response is refused before tables and finite elements are computed.
     if variant.is_elastic or not all(request.stored for request in project.missing_tables()):
         with suppress(FailedError):  # such a failure does not apply to the selected mesh model
-            if reason := steady_lack(assembled_by_iso(gearbox, variant), variant):
+            assembly = assembled_by_iso(gearbox, variant)
+            if reason := steady_lack(assembly, variant):
                 raise BadInputError(reason)
+            check_varying(assembly, settings.method)
     if quantity == "sound_power" and not radiating_names(gearbox, variant):
         raise BadInputError(
             f"--quantity sound_power: the variant {variant} has no flexible housing; use --variant flexible, and give "

@@ -325,9 +325,9 @@ def _check_varying(frame: RotatingFrame) -> None:
     varying = sorted({planets.carrier for planets in of_meshes if planets is not None})
     if len(varying) > 1:
         raise SteadyError(
-            f"bodies.{', bodies.'.join(varying)}: stiffness varies with the angles of several carriers (planets "
-            "fewer than three or unequally spaced, or a flexible ring gear), which the steady-state response cannot "
-            "treat; use exugear run"
+            f"bodies.{', bodies.'.join(varying)}: stiffness varies with the angles of several carriers (planets that "
+            "are fewer than three or unequally spaced, or a flexible ring gear), which the steady-state response "
+            "cannot treat; use exugear run"
         )
     rows = np.diff(frame.assembly.connectors.rolling.first)
     for n in frame.varying_bearings:

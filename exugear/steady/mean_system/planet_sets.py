@@ -12,6 +12,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
+from exugear.gearbox.parts import Body
 from exugear.system.bearings.stiffness import FEWEST, equally_spaced, planet_families
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Floats
@@ -123,6 +124,15 @@ def wave_kinds(planets: int, count: int) -> tuple[tuple[WaveKind, int], ...]:
     return tuple(found[:count])
 
 
+def unlike_families(bodies: Sequence[Body]) -> dict[str, str]:
+    """Return carriers whose planets are fewer than three or unequally spaced, each with a family of such planets."""
+    return {
+        str(planets[0].carrier): planets[0].family
+        for planets in planet_families(bodies)
+        if len(planets) < FEWEST or not equally_spaced(planets)
+    }
+
+
 def planet_sets(assembly: Assembly) -> tuple[PlanetSet, ...]:
     """Planet sets of a gearbox, checked.
 
@@ -138,8 +148,8 @@ def planet_sets(assembly: Assembly) -> tuple[PlanetSet, ...]:
     speeds = gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
     sets = []
     families = planet_families(assembly.bodies)
-    unlike = {planets[0].carrier for planets in families if len(planets) < FEWEST or not equally_spaced(planets)}
-    for carrier in sorted(str(name) for name in unlike):
+    unlike = unlike_families(assembly.bodies)
+    for carrier in sorted(unlike):
         if carrier in assembly.elastic_bodies:
             raise SteadyError(
                 f"bodies.{carrier}: a flexible carrier of planets that are fewer than three or unequally spaced, which "

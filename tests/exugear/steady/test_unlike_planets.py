@@ -24,6 +24,8 @@ from exugear.system.build import assemble
 from exugear.system.statics import static_state
 
 from ..cases import gear_trains
+from ..cases.case_mutations import toml_text
+from ..cases.command import exugear
 from ..cases.steady_runs import apart, apart_over_time, fitted, solver_of
 
 CYCLE = 2.0 * np.pi * np.arange(50) / 50
@@ -197,6 +199,18 @@ def test_methods_without_the_angle_of_the_carrier_are_refused(method):
     settings = SteadySettings(SpeedRange(40.0, 60.0, 2), method)
     with pytest.raises(SteadyError, match=f"bodies.planet: .* the method {method} does not include; use --method para"):
         response_of(train(gear_trains.planetary("ring", 2)), settings)
+
+
+@pytest.mark.parametrize("method", ["linear", "nonlinear"])
+def test_a_refused_method_ends_with_code_2_and_writes_nothing(tmp_path, method):
+    case = tmp_path / "gearbox.toml"
+    case.write_text(toml_text(gear_trains.planetary("ring", 2)), encoding="utf-8")
+    folder = tmp_path / "results"
+    speeds = ("--speeds", "300:600", "--points", "3")
+    found = exugear("steady", case, "--variant", "bushing", *speeds, "--method", method, "--out", folder)
+    assert found.exit_code == 2
+    assert "use --method parametric" in " ".join(found.output.split())
+    assert not folder.exists()
 
 
 def test_what_is_not_supported_is_said_before_any_work():
