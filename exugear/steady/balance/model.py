@@ -107,8 +107,7 @@ class HarmonicBalanceModel:
         # Lines of the larger set are kept apart where forces are evaluated in time.
         self._usual = self._reach = HarmonicTruncation(2 * harmonics, 2 * combinations)
         self.lines = self._lines_within(HarmonicTruncation(harmonics, combinations))
-        # Only forces that are evaluated in time need it, and these are not where stiffness varies with the carrier.
-        self.larger = self.lines if waves.neighbours else self._lines_within(self._usual, products=True)
+        self._larger: LineSet | None = None
         self._least = 0
         # Shared by all that differ in their lines alone.
         self._lattices: dict[tuple[HarmonicTruncation, int, int], TorusSampling] = {}
@@ -129,6 +128,13 @@ class HarmonicBalanceModel:
         self.signal_names: tuple[SignalName, ...] = (*self._row_names, *mesh_signal_names(waves))
         if self.radiated is not None:
             self.signal_names += (SURFACE_VELOCITY,)
+
+    @property
+    def larger(self) -> LineSet:
+        """Lines that samples keep apart where forces are evaluated in time: products of two lines among them."""
+        if self._larger is None:
+            self._larger = self._lines_within(self._reach, products=True)
+        return self._larger
 
     @property
     def shuttles(self) -> bool:
@@ -271,7 +277,7 @@ class HarmonicBalanceModel:
         if not clear:
             other._least = 0
         if reach != self._reach:
-            other._reach, other.larger, other._least = reach, self._lines_within(reach, products=True), 0
+            other._reach, other._larger, other._least = reach, None, 0
         return other
 
     def with_system(self, system: MeanSystem) -> HarmonicBalanceModel:
@@ -343,14 +349,13 @@ class HarmonicBalanceModel:
         """Copy with the usual lines of other harmonics of each mesh frequency."""
         other = self._copied()
         combinations = self._usual.combinations
-        other.harmonics, other._least = 2 * harmonics, 0
+        other.harmonics, other._least, other._larger = 2 * harmonics, 0, None
         other._usual = other._reach = HarmonicTruncation(2 * harmonics, combinations)
         if self.waves.neighbours:  # those beside the known lines are known to be needed
             more = self._lines_within(HarmonicTruncation(harmonics, combinations // 2), neighbours=0)
             other.lines = joined(self.lines, more)
             return other
         other.lines = self._lines_within(HarmonicTruncation(harmonics, combinations // 2))
-        other.larger = self._lines_within(other._usual, products=True)
         return other
 
     @cached_property
@@ -359,8 +364,7 @@ class HarmonicBalanceModel:
         other = self._copied()
         usual = self._usual
         other.lines = self._lines_within(HarmonicTruncation(usual.harmonics, usual.combinations // 2))
-        other._reach = HarmonicTruncation(2 * usual.harmonics, usual.combinations)
-        other.larger = self._lines_within(other._reach, products=True)
+        other._reach, other._larger = HarmonicTruncation(2 * usual.harmonics, usual.combinations), None
         return other
 
     def _copied(self) -> HarmonicBalanceModel:
@@ -396,7 +400,7 @@ class HarmonicBalanceModel:
         known = self.lines if waves.passing else beside(self.lines, slow, 0)
         other.lines = joined(known, beside(loud, slow, more))
         # Of products that lie farther off in both senses little is left.
-        other.larger = joined(joined(beside(whole, slow, 1), beside(loud, slow, more + 1)), other.lines)
+        other._larger = joined(joined(beside(whole, slow, 1), beside(loud, slow, more + 1)), other.lines)
         return other
 
     def places_in(self, other: HarmonicBalanceModel) -> tuple[Integers, ...]:
@@ -446,6 +450,14 @@ class HarmonicBalanceModel:
     def varying(self) -> tuple[Family, ...]:
         """Families with more waves than planets, on one carrier: see `MeshWaves.varying_carrier`."""
         return tuple(own for own in self.families if own.planets is not None and own.count > own.planets.waves)
+
+    @cached_property
+    def varying_waves(self) -> Booleans:
+        """Components (m,) of these families, among those of the meshes."""
+        found = np.zeros(len(self.waves.waves), dtype=bool)
+        for family in self.varying:
+            found[family.waves] = True
+        return found
 
     @cached_property
     def varying_bearings(self) -> UnequalBearings | None:

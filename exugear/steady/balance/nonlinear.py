@@ -19,15 +19,25 @@ import numpy as np
 
 from exugear.steady.balance.interface import Interface
 from exugear.steady.balance.model import HarmonicBalanceModel
+from exugear.steady.balance.passing_planets import PassingPlanets, VaryingPart, carried_readings
 from exugear.steady.balance.response import Response, rates_of
 from exugear.steady.harmonics.branches import exponents, kicks_needed
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError, solve_lines
 from exugear.steady.harmonics.lines import TorusSampling
 from exugear.steady.mean_system.bearing_waves import COMPONENTS
 from exugear.steady.mean_system.mean_system import mean_modes, most_rolling
-from exugear.steady.mean_system.mesh_places import BACK, DEFLECTION, FRONT, MISALIGNMENT, POSITION, MeshPlaces
+from exugear.steady.mean_system.mesh_places import (
+    BACK,
+    DEFLECTION,
+    FRONT,
+    MISALIGNMENT,
+    POSITION,
+    MeshPlaces,
+    slopes_over_turn,
+)
 from exugear.steady.mean_system.sampled_laws import (
     LawSamples,
+    add_resistance,
     sample_curve,
     sample_line,
     sample_rolling,
@@ -79,7 +89,12 @@ class HarmonicResidual:
         found = np.zeros(self.interface.ports.forces.shape[:2])
         m = self.meshes
         model = self.model
-        found[:m, DEFLECTION] = model.waves.mean_stiffness * model.pressed(self.interface.ports.static)
+        static = self.interface.ports.static
+        found[:m, DEFLECTION] = model.waves.mean_stiffness * model.pressed(static)
+        if self._tilting.any():
+            stiffness, _, moment = self._tilting.T
+            found[:m, MISALIGNMENT] = stiffness * static[:m, MISALIGNMENT]
+            found[:m, MISALIGNMENT] -= moment * [wave.wave == 0 for wave in model.waves.waves]
         if self.interface.bearings is not None:
             found[m:, :COMPONENTS] = self.interface.bearings.load
         return found
@@ -95,6 +110,25 @@ class HarmonicResidual:
     def meshes(self) -> int:
         """Number of the meshes' waves, behind which those of bearings follow."""
         return len(self.model.waves.waves)
+
+    @cached_property
+    def _dampers(self) -> Floats:
+        """Damping (m,) along the deflections that the laws have in time, and the averaged system in the mean, N s/m.
+
+        That of tables comes and goes; that of laws along a row varies with the carrier where their stiffness does.
+        """
+        in_time = self.model.varying_waves | self.model.loses_contact
+        return np.where(in_time, self.model.waves.damping, 0.0)
+
+    @property
+    def _reads_rates(self) -> bool:
+        """Whether laws read rates, too."""
+        return self.model.loses_contact or bool(self._dampers.any())
+
+    @cached_property
+    def _tilting(self) -> Floats:
+        """Resistance to misalignment (m, 3) that varies with the carrier, as `MeshWaves.tilting` has it."""
+        return np.zeros((self.meshes, 3)) if self.model.loses_contact else self.model.cycles.varying_tilting
 
     @cached_property
     def _curved(self) -> bool:
@@ -167,7 +201,10 @@ class HarmonicResidual:
                 whole[:, POSITION] += places.positions[:, u]
                 found.append(sample_table(meshes, waves.waves[n].first, whole, rates[:, u]))
             else:
-                found.append(self._sample_row(n, readings[:, u], stiffness[..., u]))
+                samples = self._sample_row(n, readings[:, u], stiffness[..., u])
+                if self.model.varying_waves[n]:
+                    add_resistance(samples, readings[:, u], rates[:, u], self._dampers[n], *self._tilting[n])
+                found.append(samples)
         shape = self.interface.ports.forces.shape[1], readings.shape[2]
         found = [widened(samples, *shape) for samples in found]
         return LawSamples(*(np.stack(samples, axis=1) for samples in zip(*found, strict=True)))
@@ -197,7 +234,7 @@ class HarmonicResidual:
     def _sample_readings(self, readings: Complexes) -> tuple[Floats, Floats]:
         """Sample (s, m, r) readings and of their rates, the latter zero where no law asks for them."""
         values = self.sampling.values(readings)
-        if not self.model.loses_contact:
+        if not self._reads_rates:
             return values, np.zeros_like(values)
         return values, self.sampling.values(rates_of(self.model, self.interface.speed, readings))
 
@@ -228,12 +265,10 @@ class HarmonicResidual:
 
     @cached_property
     def _dragged(self) -> Complexes:
-        """Forces (n, m, f) of the dampers under deviations of gears, which laws along a row do not have."""
+        """Forces (n, m, f) under deviations of gears by the dampers that are in the averaged system alone."""
         found = np.zeros((len(self.static), *self.interface.ports.forces.shape[:2]), dtype=complex)
-        waves = self.model.waves
-        if not self.model.loses_contact:
-            own = self.model.deviations(self.interface.speed)
-            found[:, : self.meshes, DEFLECTION] = -waves.damping * rates_of(self.model, self.interface.speed, own)
+        rates = rates_of(self.model, self.interface.speed, self.model.deviations(self.interface.speed))
+        found[:, : self.meshes, DEFLECTION] = (self._dampers - self.model.waves.damping) * rates
         return found
 
     @cached_property
@@ -250,7 +285,7 @@ class HarmonicResidual:
         back = self.places.back
         moved, moving = self._sample_readings(step)
         found = np.einsum("sufr,sur->suf", sampled.slope, there @ moved)
-        if self.model.loses_contact:
+        if self._reads_rates:
             found += np.einsum("sufr,sur->suf", sampled.damping, there @ moving)
         return np.asarray(self.sampling.coefficients(back @ found) - self._mean_slopes(step))
 
@@ -279,10 +314,10 @@ class HarmonicResidual:
         """Subtract the slopes of the averaged system from slopes (..., m, f, m, r)."""
         waves = self.model.waves
         at = np.arange(self.meshes)
+        if self._tilting.any():
+            slopes[..., at, MISALIGNMENT, at, MISALIGNMENT] -= self._tilting[:, int(by_rates)]
         if by_rates:
-            # The damper of laws along a row is the same in the mean system; that of a table comes and goes.
-            if self.model.loses_contact:
-                slopes[..., at, DEFLECTION, at, DEFLECTION] -= waves.damping
+            slopes[..., at, DEFLECTION, at, DEFLECTION] -= self._dampers
             return
         slopes[..., at, DEFLECTION, at, DEFLECTION] -= waves.mean_stiffness
         if self.interface.bearings is not None:
@@ -335,8 +370,12 @@ class HarmonicResidual:
         deflection = change[:, :m, DEFLECTION]
         found = np.zeros((len(change), *self.interface.ports.forces.shape[:2]), dtype=complex)
         found[:, :m, DEFLECTION] = waves.mean_stiffness * deflection
-        if self.model.loses_contact:
-            found[:, :m, DEFLECTION] += waves.damping * rates_of(self.model, self.interface.speed, deflection)
+        if self._reads_rates:
+            found[:, :m, DEFLECTION] += self._dampers * rates_of(self.model, self.interface.speed, deflection)
+        if self._tilting.any():
+            stiffness, damping, _ = self._tilting.T
+            tilt = change[:, :m, MISALIGNMENT]
+            found[:, :m, MISALIGNMENT] += stiffness * tilt + damping * rates_of(self.model, self.interface.speed, tilt)
         if self.interface.bearings is not None:
             slope = self.interface.bearings.slope
             own = change[:, m:, :COMPONENTS]
@@ -398,11 +437,43 @@ class Tangent:
         return found / lengths, products
 
     def alone(self, right: Complexes) -> Complexes:
-        """Solve for readings (n, m, r) that change what is missing by `right`, each line by itself."""
+        """Solve for readings (n, m, r) that change what is missing by `right`, each line by itself.
+
+        Where stiffness varies with the carrier, lines are solved with those beside them.
+        """
         read = self.balance.read
         found = right.reshape(len(right), -1).copy()
         found[:, read] = (self._inverse @ found[:, read, None])[..., 0]
+        if self._passing is not None:
+            found = self._passing.solve(found)
         return found.reshape(right.shape)
+
+    @cached_property
+    def _passing(self) -> PassingPlanets | None:
+        """Coupling of lines by the slopes of the laws in their mean over time; None where nothing varies."""
+        balance = self.balance
+        model, interface = balance.model, balance.interface
+        if not model.varying:
+            return None
+        n, m, r = balance.static.shape
+        f = interface.ports.forces.shape[1]
+        means = np.array(balance.places.means)
+        parts = []
+        forces = []
+        for family in model.varying:
+            of_places = means == family.first
+            slope, damping = (
+                values[:, of_places].mean(axis=0) for values in (self.sampled.slope, self.sampled.damping)
+            )
+            stiffness, damper = (slopes_over_turn(family, values, interface.speed) for values in (slope, damping))
+            stiffness[family.turns] = 0.0  # the mean is in what each line answers by itself
+            own = slice(r * family.first, r * (family.first + family.count))
+            parts.append(VaryingPart(own, stiffness, damper, carried_readings(model, interface.speed, family, r)))
+            forces += range(f * family.first, f * (family.first + family.count))
+        answers = interface.readings.reshape(n, m * r, m * f)[:, :, forces]
+        read = balance.read
+        answers[:, read] = self._inverse @ answers[:, read]
+        return PassingPlanets(model, interface, parts, answers)
 
     @cached_property
     def _inverse(self) -> Complexes:
