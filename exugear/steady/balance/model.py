@@ -79,6 +79,10 @@ from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
 
 SAMPLES_PER_HARMONIC = 16
 """Minimum samples per mesh period over the harmonics, with contact loss: kinks need more than products of orders."""
+KEPT_APART = 6
+"""Multiples of the planet passing frequency beside products of two orders that samples keep apart from the orders."""
+STARTING_NEIGHBOURS = 1
+"""Multiples of the planet passing frequency beside each order with which states with contact loss begin."""
 SHAFT_NEIGHBOURS = 3
 """Multiples of the planet passing frequency by which orders of shafts are coupled to others, where stiffness varies.
 
@@ -106,13 +110,16 @@ class HarmonicBalanceModel:
         self.shaft_orders = orders or ShaftOrders()
         # Lines of the larger set are kept apart where forces are evaluated in time.
         self._usual = self._reach = HarmonicTruncation(2 * harmonics, 2 * combinations)
-        self.lines = self._lines_within(HarmonicTruncation(harmonics, combinations))
+        self.loses_contact = LAWS[waves.assembly.mesh_model].loses_contact
+        # With contact loss, each state takes in those of the larger set that it needs.
+        few = STARTING_NEIGHBOURS if self.loses_contact else None
+        self.lines = self._lines_within(HarmonicTruncation(harmonics, combinations), neighbours=few)
         self._larger: LineSet | None = None
         self._least = 0
         # Shared by all that differ in their lines alone.
-        self._lattices: dict[tuple[HarmonicTruncation, int, int], TorusSampling] = {}
+        self._lattices: dict[tuple[HarmonicTruncation, int, int, int], TorusSampling] = {}
         self._one_by_one: dict[int, HarmonicBalanceModel] = {}
-        self.loses_contact = LAWS[waves.assembly.mesh_model].loses_contact
+        self._varying_bearings: list[UnequalBearings | None] = []
         self.bearings: BearingWaves | None = None
         self._bearing_means: tuple[BearingMean, ...] = ()
         ports = []
@@ -133,7 +140,9 @@ class HarmonicBalanceModel:
     def larger(self) -> LineSet:
         """Lines that samples keep apart where forces are evaluated in time: products of two lines among them."""
         if self._larger is None:
-            self._larger = self._lines_within(self._reach, products=True)
+            own = self._lines_within(self._reach, products=True, neighbours=min(self.waves.neighbours, KEPT_APART))
+            # Neighbours farther off are few, and only those that a state has.
+            self._larger = joined(own, self.lines) if self.waves.neighbours > KEPT_APART else own
         return self._larger
 
     @property
@@ -246,7 +255,7 @@ class HarmonicBalanceModel:
     def sampling(self) -> TorusSampling:
         """Samples on which forces are evaluated in time."""
         least = max(self._least, SAMPLES_PER_HARMONIC * self._reach.harmonics if self.is_nonlinear else 0)
-        key = self._reach, least, self.waves.passing
+        key = self._reach, least, self.waves.passing, len(self.larger.index)
         known = self._lattices.get(key)
         if self.waves.passing:
             known = rank1_lattice(self.lines, self.larger, least, shared=True)
@@ -284,6 +293,7 @@ class HarmonicBalanceModel:
         """Copy with another averaged system of the same coordinates, such as one with another damping."""
         other = self._copied()
         other.waves = replace(self.waves, system=system)
+        other._varying_bearings = []
         return other
 
     @cached_property
@@ -299,6 +309,8 @@ class HarmonicBalanceModel:
         """Copy with some of its orders, selected by a mask (n,)."""
         other = self._copied()
         other.lines = self.lines.part(which)
+        if self.waves.neighbours:
+            other._larger = None
         return other
 
     def _lines_within(
@@ -459,10 +471,12 @@ class HarmonicBalanceModel:
             found[family.waves] = True
         return found
 
-    @cached_property
+    @property
     def varying_bearings(self) -> UnequalBearings | None:
         """What bearings of planets that are not alike have beyond the averaged system; None without any."""
-        return varying_bearings(self.system)
+        if not self._varying_bearings:
+            self._varying_bearings.append(varying_bearings(self.system))
+        return self._varying_bearings[0]
 
     @cached_property
     def _along_bearings(self) -> Floats:

@@ -2,16 +2,10 @@
 
 Orders are converted to samples on a lattice of the bases' angles, the models are evaluated there, and their forces are
 converted back to orders. Newton's method solves the balance, each step by GMRES on the tangents along the lattice.
-
-Harmonic balance does not show stability. The largest growth rate follows from two methods: a first-order estimate for
-all pairs of modes at once, which finds the speeds of combination instability of two modes and a mesh harmonic (Hsu
-1963), and Floquet exponents of the whole system at one speed, one base at a time, the meshes of others at their mean.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -19,13 +13,16 @@ import numpy as np
 
 from exugear.steady.balance.interface import Interface
 from exugear.steady.balance.model import HarmonicBalanceModel
-from exugear.steady.balance.passing_planets import PassingPlanets, VaryingPart, carried_readings
+from exugear.steady.balance.passing_planets import (
+    PassingPlanets,
+    PlanetBearings,
+    VaryingPart,
+    carried_readings,
+)
 from exugear.steady.balance.response import Response, rates_of
-from exugear.steady.harmonics.branches import exponents, kicks_needed
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError, solve_lines
 from exugear.steady.harmonics.lines import TorusSampling
 from exugear.steady.mean_system.bearing_waves import COMPONENTS
-from exugear.steady.mean_system.mean_system import mean_modes, most_rolling
 from exugear.steady.mean_system.mesh_places import (
     BACK,
     DEFLECTION,
@@ -46,7 +43,6 @@ from exugear.steady.mean_system.sampled_laws import (
     sample_wandering_line,
     widened,
 )
-from exugear.system.modes import fastest_growth, state_matrix
 from fe_ste.tools.arrays import Complexes, Floats, Integers
 
 BALANCED = 1e-8
@@ -73,7 +69,29 @@ class HarmonicResidual:
     @cached_property
     def static(self) -> Complexes:
         """Readings (n, m, r) of the static state with friction."""
-        return self.interface.static
+        if self._bearings is None:
+            return self.interface.static
+        return self.interface.static - self._read_of_bearings(self._bearings.given)
+
+    @cached_property
+    def _bearings(self) -> PlanetBearings | None:
+        """Bearings that vary with the carrier; None without any."""
+        return None if self.model.varying_bearings is None else PlanetBearings(self.model, self.interface)
+
+    @cached_property
+    def along_bearings(self) -> Complexes:
+        """Readings (n, m, r, c) under a unit of force along each coordinate of these bearings."""
+        return self.interface.read(self.interface.along_bearings)
+
+    def _read_of_bearings(self, forces: Complexes) -> Complexes:
+        """Find readings (n, m, r) under forces (n, c) along these coordinates."""
+        return np.asarray(np.einsum("nmrc,nc->nmr", self.along_bearings, forces))
+
+    def bearing_forces(self, excess: Complexes) -> Complexes:
+        """Return forces (n, c) of these bearings beyond the averaged system, under forces (n, m, f) of the laws."""
+        if self._bearings is None:
+            return np.zeros((len(excess), 0), dtype=complex)
+        return self._bearings.given + self._bearings.forces(excess)
 
     @cached_property
     def places(self) -> MeshPlaces:
@@ -405,7 +423,8 @@ class HarmonicResidual:
         """Find the readings -G F (n, m, r) under forces (n, m, f)."""
         shape = self.interface.readings.shape
         matrix = self.interface.readings.reshape(shape[0], shape[1] * shape[2], shape[3] * shape[4])
-        return np.asarray(-(matrix @ excess.reshape(shape[0], -1, 1))).reshape(shape[:3])
+        found = np.asarray(-(matrix @ excess.reshape(shape[0], -1, 1))).reshape(shape[:3])
+        return found if self._bearings is None else found - self._read_of_bearings(self._bearings.forces(excess))
 
 
 @dataclass(frozen=True, eq=False)
@@ -426,26 +445,31 @@ class Tangent:
     def solved(self, right: Complexes, tolerance: float = STEP_TOLERANCE) -> tuple[Complexes, int]:
         """Solve for readings (n, m, r) that change what is missing by `right`, and count the products that it takes.
 
-        The balance of each line by itself, solved exactly, leaves GMRES what varying laws do between lines.
+        The balance of each line by itself, solved exactly, leaves GMRES what varying laws do between lines. Where
+        stiffness varies with the carrier, lines are solved with those beside them.
         """
         lengths = self.balance.model.lengths
+        passing = self._passing
+
+        def solved(wanted: Complexes) -> Complexes:
+            found = self.alone(wanted)
+            if passing is not None:
+                rest = np.zeros((len(found), self.balance.interface.along_bearings.shape[2]), dtype=complex)
+                flat = found.reshape(len(found), -1)
+                found = passing.solve(np.hstack([flat, rest]))[:, : flat.shape[1]].reshape(found.shape)
+            return lengths * found
 
         def apply(scaled: Complexes) -> Complexes:
-            return lengths * self.alone(self.missing(scaled / lengths))
+            return solved(self.missing(scaled / lengths))
 
-        found, products = solve_lines(apply, lengths * self.alone(right), tolerance)
+        found, products = solve_lines(apply, solved(right), tolerance)
         return found / lengths, products
 
     def alone(self, right: Complexes) -> Complexes:
-        """Solve for readings (n, m, r) that change what is missing by `right`, each line by itself.
-
-        Where stiffness varies with the carrier, lines are solved with those beside them.
-        """
+        """Solve for readings (n, m, r) that change what is missing by `right`, each line by itself."""
         read = self.balance.read
         found = right.reshape(len(right), -1).copy()
         found[:, read] = (self._inverse @ found[:, read, None])[..., 0]
-        if self._passing is not None:
-            found = self._passing.solve(found)
         return found.reshape(right.shape)
 
     @cached_property
@@ -459,7 +483,7 @@ class Tangent:
         f = interface.ports.forces.shape[1]
         means = np.array(balance.places.means)
         parts = []
-        forces = []
+        columns: list[int] = []
         for family in model.varying:
             of_places = means == family.first
             slope, damping = (
@@ -469,8 +493,16 @@ class Tangent:
             stiffness[family.turns] = 0.0  # the mean is in what each line answers by itself
             own = slice(r * family.first, r * (family.first + family.count))
             parts.append(VaryingPart(own, stiffness, damper, carried_readings(model, interface.speed, family, r)))
-            forces += range(f * family.first, f * (family.first + family.count))
+            columns += range(f * family.first, f * (family.first + family.count))
+        forces = np.array(columns)
         answers = interface.readings.reshape(n, m * r, m * f)[:, :, forces]
+        if model.varying_bearings is not None:
+            parts.append(PlanetBearings.part(model, interface, m * r))
+            at = model.varying_bearings.coordinates
+            moved = interface.motion[:, at].reshape(n, len(at), m * f)[:, :, forces]
+            along = interface.along_bearings
+            read_there = balance.along_bearings.reshape(n, m * r, -1)
+            answers = np.block([[answers, read_there], [moved, along[:, at]]])
         read = balance.read
         answers[:, read] = self._inverse @ answers[:, read]
         return PassingPlanets(model, interface, parts, answers)
@@ -591,7 +623,8 @@ def response_of_readings(balance: HarmonicResidual, readings: Complexes, product
         force = excess[:, :m, 0] + waves.mean_stiffness * deflection + waves.damping * rates
         force[0] -= waves.mean_stiffness * waves.rest
     free = _free_shares(balance, whole)
-    return Response(interface, deflection, excess, force * waves.line_of_action, products, apart, free)
+    of_bearings = balance.bearing_forces(excess)
+    return Response(interface, deflection, excess, force * waves.line_of_action, products, apart, free, of_bearings)
 
 
 def _free_shares(balance: HarmonicResidual, whole: Floats) -> Floats:
@@ -618,126 +651,3 @@ def _mean_of_waves(there: Floats, back: Floats, slopes: Floats) -> Floats:
         mean = np.tensordot(turning, slopes[:, u], axes=(0, 0)) / samples
         found[own[:, None], :, own] += mean
     return found
-
-
-SMOOTH_KICKS, PARTING_KICKS = 400, 1000
-"""Minimum number of kicks per period, without and with contact loss, whose instants have to be resolved."""
-CHECKED = 3
-"""Candidates whose Floquet exponents are computed."""
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A speed at which two modes and a harmonic of a mesh frequency may work together."""
-
-    speed: float
-    """Of the input, rad/s."""
-    base: int
-    harmonic: int
-    """Which mesh frequency, and the multiple of it that is the sum or difference of both modes' frequencies."""
-    growth: float
-    """Estimate of the fastest growth there, 1/s."""
-
-
-def candidates(model: HarmonicBalanceModel, low: float, high: float) -> tuple[Candidate, ...]:
-    """Find combination resonances between two speeds (rad/s), the fastest growing first, to first order."""
-    middle = 0.5 * (low + high)
-    values, right, left = mean_modes(model.system, middle)
-    size = model.system.size
-    ports = model.ports_at(middle)
-    felt = left[:, size:] @ np.linalg.solve(model.system.mass, model.loads(ports).astype(complex))
-    felt = felt.reshape(len(felt), len(model.waves.waves), -1)
-    seen = right[:, :size] @ np.moveaxis(ports.readings, (0, 1, 2), (2, 0, 1))
-    decay = -values.real
-    frequency = values.imag
-    slow = min(abs(low), abs(high))
-    found = []
-    for base, order in enumerate(model.waves.base_orders):
-        of_base = np.array([wave.base == base for wave in model.waves.waves])
-        for harmonic in range(1, model.harmonics + 1):
-            tangents = {at: of_base * values[:, harmonic] for at, values in model.cycles.tangents.items()}
-            turned = {at: values.conj() for at, values in tangents.items()}
-            for sign in (1.0, -1.0):
-                there = _couple_modes(felt, tangents, seen.conj() if sign > 0.0 else seen)
-                back = there.conj() if sign > 0.0 else _couple_modes(felt, turned, seen)
-                product = there * back.T
-                growth = -0.5 * (decay[:, None] + decay) + np.real(
-                    np.sqrt(0.25 * (decay[:, None] - decay) ** 2 + product)
-                )
-                speed = (frequency[:, None] + sign * frequency) / (harmonic * order)
-                inside = (speed >= slow) & (speed <= max(abs(low), abs(high))) & (speed > 0.0)
-                if inside.any():
-                    i, j = np.unravel_index(np.argmax(np.where(inside, growth, -np.inf)), growth.shape)
-                    at = float(np.copysign(speed[i, j], middle))
-                    found.append(Candidate(at, base, harmonic, float(growth[i, j])))
-    return tuple(sorted(found, key=lambda candidate: -candidate.growth))
-
-
-def _couple_modes(felt: Complexes, tangents: Mapping[tuple[int, int], Complexes], seen: Complexes) -> Complexes:
-    """Couple modes (k, k) by tangents (m,) of forces by readings; what they feel (k, m, f) and make seen (r, k, m)."""
-    parts = [(felt[..., force] * tangent) @ seen[read].T for (force, read), tangent in tangents.items()]
-    return np.asarray(np.sum(parts, axis=0))
-
-
-def growth_at(balance: HarmonicResidual, readings: Complexes, base: int, least: int = SMOOTH_KICKS) -> float:
-    """Return the largest growth rate, 1/s, of a disturbance of a steady state, by Floquet exponents over one base.
-
-    Parameters
-    ----------
-    balance : at the speed
-    readings : (n, m, r) inputs of the models in the steady state
-    base : base that varies
-    least : minimum number of kicks per period
-    """
-    model = balance.model
-    interface = balance.interface
-    system = model.system
-    ports = interface.ports
-    size = system.size
-    speed = interface.speed
-    period = 2.0 * np.pi / (abs(speed) * float(model.waves.base_orders[base]))
-    values = system.eigenvalues(speed)
-    kicks = max(kicks_needed(float(np.abs(values).max()) / 2.0 / np.pi, period), least)
-    varying = balance.tangents_along(readings, base, kicks)
-    pushes = np.vstack(
-        [np.zeros((size, varying.shape[1])), np.linalg.solve(system.mass, model.loads(ports))],
-    )
-    rows = ports.readings.reshape(-1, size)
-    # Rates of the waves as their meshes see them: those in the frame, and what the turning carries along.
-    carried = speed * np.tensordot(model.partners, ports.readings, axes=1).reshape(-1, size)
-    by_rates = np.zeros_like(rows) if ports.rates is None else ports.rates.reshape(-1, size)
-    reads = np.block([[rows, by_rates], [carried, rows]])
-    # Meshes of other bases do not vary: they belong to the constant part. Bearings do with all bases.
-    of_base = np.ones(len(model.weights), dtype=bool)
-    of_base[: len(model.waves.waves)] = [wave.base == base for wave in model.waves.waves]
-    pushed = np.repeat(of_base, ports.forces.shape[1])
-    read = np.tile(np.repeat(of_base, ports.readings.shape[1]), 2)
-    constant = state_matrix(system.mass, system.damping_at(speed), system.stiffness_at(speed))
-    constant -= pushes[:, ~pushed] @ varying[0][np.ix_(~pushed, ~read)] @ reads[~read]
-    # Many slopes are zero: what nothing pushes along or reads costs nothing then.
-    pushed = pushed & varying.any(axis=(0, 2))
-    read = read & varying.any(axis=(0, 1))
-    varying = varying[:, pushed][:, :, read]
-    pushes = pushes[:, pushed]
-    reads = reads[read]
-    found, shapes = exponents(constant, pushes, reads, varying, period)
-    # Free rolling neither grows nor decays but for what the losses change with the speed: it is known by its shape.
-    return float(np.delete(found, most_rolling(system, shapes[:size])).real.max())
-
-
-def growth_of_state(balance: HarmonicResidual, readings: Complexes, parted: bool) -> float:
-    """Return the largest growth rate of a disturbance of a steady state over the bases, 1/s.
-
-    Parameters as of `growth_at`; `parted` is True with contact loss. NaN where planets mesh out of phase, and where
-    gears with deviations lose contact: angles of shafts are then excitations in addition to the mesh cycle.
-    """
-    model = balance.model
-    if model.waves.carriers or (parted and model.deviations(balance.interface.speed).any()):
-        return math.nan
-    least = PARTING_KICKS if parted else SMOOTH_KICKS
-    return max(growth_at(balance, readings, base, least) for base in range(len(model.waves.base_orders)))
-
-
-def mean_growth(model: HarmonicBalanceModel) -> float:
-    """Largest growth rate of the averaged system over its speeds, 1/s; free rotation excluded."""
-    return max(fastest_growth(model.system.eigenvalues(float(speed))) for speed in model.system.speeds)

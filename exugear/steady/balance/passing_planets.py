@@ -99,6 +99,7 @@ class PassingPlanets:
             row, column = row + forces, column + readings
         of_damper[self._turns] = 0.0
         self._of_damper = of_damper
+        self._stiffness = stiffness
         self._solved_groups = tuple(self._groups(stiffness, answers))
 
     @cached_property
@@ -113,6 +114,10 @@ class PassingPlanets:
         found = np.zeros_like(readings)
         found[:, self._at] = self._coupling.of([self._of_damper], rates)
         return found
+
+    def forces(self, readings: Complexes) -> Complexes:
+        """Return the forces (n, k) along readings (n, k) that all vary."""
+        return self._coupling.of([self._stiffness], readings) + self.damper_forces(readings)
 
     def _groups(self, stiffness: Complexes, answers: Complexes) -> Iterator[SolvedGroups]:
         """Solve the groups of lines with their neighbours, in which the mesh cycle does not vary, by their size.
@@ -187,7 +192,7 @@ class PassingPlanets:
             ]
             found = np.array(own).reshape(*given.shape[:2], -1)
             at, to, of = group.coupled
-            forces = np.zeros_like(found)
+            forces = np.zeros((*found.shape[:2], group.answers.shape[3]), dtype=complex)
             np.add.at(forces, (at, to), (group.blocks @ found[at, of, :, None])[..., 0])
             solved = given - (group.answers @ forces[..., None])[..., 0]
             out[group.lines[group.mirrored]] = solved[group.mirrored].conj()
@@ -223,10 +228,8 @@ def passing_planets(
         carried = carried_readings(model, interface.speed, family, forces)
         parts.append(VaryingPart(own, over_cycle[len(over_cycle) // 2], of_damper / lengths[own], carried))
     if model.varying_bearings is not None:
-        of_damper = model.varying_bearings.functions_at(interface.speed)[1]
-        count = len(model.varying_bearings.coordinates)
-        own = slice(forces * len(model.weights), forces * len(model.weights) + count)
-        parts.append(VaryingPart(own, functions[-1], of_damper / lengths[own], np.zeros((count, count))))
+        part = PlanetBearings.part(model, interface, forces * len(model.weights))
+        parts.append(part._replace(stiffness=functions[-1], damping=part.damping / lengths[part.readings]))
     at = np.concatenate([np.arange(part.readings.start, part.readings.stop) for part in parts])
     return PassingPlanets(model, interface, parts, answers[..., at])
 
@@ -234,3 +237,40 @@ def passing_planets(
 def carried_readings(model: HarmonicBalanceModel, speed: float, family: Family, readings: int) -> Floats:
     """Return what laws see of a family's readings in their rates as the carrier turns, (count r, count r), 1/s."""
     return np.asarray(speed * np.kron(model.waves.partners[family.waves, family.waves], np.eye(readings)))
+
+
+class PlanetBearings:
+    """Bearings that vary with the carrier, taken out of the balance of laws in time; n lines, c coordinates.
+
+    Along their coordinates q they have forces b + S q beyond the averaged system, which answers q = q_0 - H_b (b + S q)
+    to them: q_0 is the motion under all other forces, and S couples lines at multiples of the carrier's angle alone.
+    """
+
+    def __init__(self, model: HarmonicBalanceModel, interface: Interface) -> None:
+        bearings = model.varying_bearings
+        assert bearings is not None
+        self._at = bearings.coordinates
+        still = bearings.still_at(model.lines, model.varying[0].carrier, interface.speed)
+        own = interface.along_bearings[:, self._at]
+        self._coupling = PassingPlanets(model, interface, [self.part(model, interface)], own)
+        loads = 0.0 if interface.loads is None else interface.loads.motion[:, self._at]
+        self._of_meshes = interface.motion[:, self._at].reshape(len(own), len(self._at), -1)
+        self.given = still + self._varying(loads - (own @ still[..., None])[..., 0])
+        """(n, c) forces where laws have none beyond the averaged system."""
+
+    @staticmethod
+    def part(model: HarmonicBalanceModel, interface: Interface, first: int = 0) -> VaryingPart:
+        """Return what couples the coordinates, which are readings from a first one on."""
+        bearings = model.varying_bearings
+        assert bearings is not None
+        count = len(bearings.coordinates)
+        stiffness, damping = bearings.functions_at(interface.speed)
+        return VaryingPart(slice(first, first + count), stiffness, damping, np.zeros((count, count)))
+
+    def forces(self, excess: Complexes) -> Complexes:
+        """Return the forces (n, c) that laws' forces (n, m, f) beyond the averaged system cause, without `given`."""
+        return self._varying(-(self._of_meshes @ excess.reshape(len(excess), -1, 1))[..., 0])
+
+    def _varying(self, motion: Complexes) -> Complexes:
+        """Return the forces (n, c) S q where the averaged system without them moves by (n, c)."""
+        return self._coupling.forces(self._coupling.solve(motion))
