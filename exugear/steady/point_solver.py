@@ -19,12 +19,7 @@ import numpy as np
 from exugear.steady.balance.interface import Interface
 from exugear.steady.balance.model import HarmonicBalanceModel
 from exugear.steady.balance.nonlinear import (
-    CHECKED,
     HarmonicResidual,
-    candidates,
-    growth_at,
-    growth_of_state,
-    mean_growth,
     nonlinear_response,
     response_of_readings,
     solve_balance,
@@ -39,6 +34,7 @@ from exugear.steady.balance.response import (
     signals,
     transmission_errors,
 )
+from exugear.steady.balance.stability import CHECKED, candidates, growth_at, growth_of_state, mean_growth
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
 from exugear.steady.harmonics.lines import LineSet, TorusSampling, joined, largest
 from exugear.steady.mean_system.carrier_stability import growth_over_carrier
@@ -155,6 +151,7 @@ class ContactLossState:
             excess=old.excess[at],
             force=old.force[at],
             apart=old.apart[at[1]] if len(at) > 1 else old.apart,
+            of_bearings=old.of_bearings[at[0].ravel()],
         )
         return replace(self, model=model, readings=self.readings[at], response=response)
 

@@ -191,8 +191,9 @@ def check_nonlinear(gearbox: Gearbox, method: Method) -> None:
             "meshes: the train has none whose forces the method nonlinear could evaluate; use --method parametric, or "
             "exugear run"
         )
-    turning = {body.name for body in gearbox.bodies() if body.carrier is not None}
-    if turning & gearbox.pin_offsets.keys():
+    unlike = unlike_families(gearbox.bodies())  # displaced pins of these are part of the static state
+    alike = {body.name for body in gearbox.bodies() if body.carrier is not None and body.carrier not in unlike}
+    if alike & gearbox.pin_offsets.keys():
         raise SteadyError(
             "pins: the method nonlinear does not include displaced planet pins; use --method parametric with "
             "--mesh-model line_of_action, or exugear run"
@@ -200,35 +201,35 @@ def check_nonlinear(gearbox: Gearbox, method: Method) -> None:
 
 
 def check_planets(gearbox: Gearbox, method: Method) -> None:
-    """Refuse methods that do not include planets which are not alike.
+    """Refuse the method that does not include planets which are not alike.
 
     Raises
     ------
     SteadyError
-        Planets are fewer than three or unequally spaced, and the method is not ``parametric``.
+        Planets are fewer than three or unequally spaced, and the method is ``linear``.
     """
     families = unlike_families(gearbox.bodies())
-    if families and method != "parametric":
+    if families and method == "linear":
         raise SteadyError(
             f"bodies.{next(iter(families.values()))}: planets that are fewer than three or unequally spaced; the "
-            f"stiffness varies with the carrier angle, which the method {method} does not include; use --method "
-            "parametric with --mesh-model line_of_action, or exugear run"
+            "stiffness varies with the carrier angle, which the method linear does not include; use --method "
+            "parametric with --mesh-model line_of_action, --method nonlinear, or exugear run"
         )
 
 
 def check_varying(assembly: Assembly, method: Method) -> None:
-    """Refuse methods that do not include stiffness that varies as the carrier turns.
+    """Refuse the method that does not include stiffness that varies as the carrier turns.
 
     Raises
     ------
     SteadyError
-        The ring gear is flexible, or planets are not alike, and the method is not ``parametric``.
+        The ring gear is flexible, or planets are not alike, and the method is ``linear``.
     """
     check_planets(assembly.gearbox, method)
-    if assembly.travelling.first.size and method != "parametric":
+    if assembly.travelling.first.size and method == "linear":
         raise SteadyError(
-            f"the ring gear is flexible, and its stiffness under the passing planets varies: the method {method} does "
-            "not include that; use --method parametric with --mesh-model line_of_action, or exugear run"
+            "the ring gear is flexible, and its stiffness under the passing planets varies: the method linear does not "
+            "include that; use --method parametric with --mesh-model line_of_action, --method nonlinear or exugear run"
         )
 
 

@@ -19,8 +19,9 @@ from exugear.results.sound.radiated_power import RadiatedPower, equivalent_power
 from exugear.steady.balance.load_sharing import load_sharing
 from exugear.steady.balance.model import HarmonicBalanceModel
 from exugear.steady.balance.neighbours import judged_speeds, with_needed_neighbours
-from exugear.steady.balance.nonlinear import HarmonicResidual, Tangent, growth_of_state, turned_balance
+from exugear.steady.balance.nonlinear import HarmonicResidual, Tangent, turned_balance
 from exugear.steady.balance.response import Response, dissipated_and_given, exchanged_power, signals
+from exugear.steady.balance.stability import growth_of_state
 from exugear.steady.campbell import Campbell, ModeTracks, campbell_of, modes_over_speed
 from exugear.steady.crossings import (
     HARMONICS,
@@ -341,7 +342,7 @@ def response_of(
     )
     found = crossings(model, tracks, solver.forcing, operation) if at_resonances else ()
     neglected = 0.0
-    if model.waves.neighbours:
+    if model.waves.neighbours and not model.loses_contact:
         every = model.lines.index
         judged = judged_speeds(float(even.min()), float(even.max()), [one.speed for one in found])
         model, neglected = with_needed_neighbours(model, judged, prepared)

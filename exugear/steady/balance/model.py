@@ -79,6 +79,10 @@ from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
 
 SAMPLES_PER_HARMONIC = 16
 """Minimum samples per mesh period over the harmonics, with contact loss: kinks need more than products of orders."""
+KEPT_APART = 6
+"""Multiples of the planet passing frequency beside products of two orders that samples keep apart from the orders."""
+STARTING_NEIGHBOURS = 1
+"""Multiples of the planet passing frequency beside each order with which states with contact loss begin."""
 SHAFT_NEIGHBOURS = 3
 """Multiples of the planet passing frequency by which orders of shafts are coupled to others, where stiffness varies.
 
@@ -106,14 +110,16 @@ class HarmonicBalanceModel:
         self.shaft_orders = orders or ShaftOrders()
         # Lines of the larger set are kept apart where forces are evaluated in time.
         self._usual = self._reach = HarmonicTruncation(2 * harmonics, 2 * combinations)
-        self.lines = self._lines_within(HarmonicTruncation(harmonics, combinations))
-        # Only forces that are evaluated in time need it, and these are not where stiffness varies with the carrier.
-        self.larger = self.lines if waves.neighbours else self._lines_within(self._usual, products=True)
+        self.loses_contact = LAWS[waves.assembly.mesh_model].loses_contact
+        # With contact loss, each state takes in those of the larger set that it needs.
+        few = STARTING_NEIGHBOURS if self.loses_contact else None
+        self.lines = self._lines_within(HarmonicTruncation(harmonics, combinations), neighbours=few)
+        self._larger: LineSet | None = None
         self._least = 0
         # Shared by all that differ in their lines alone.
-        self._lattices: dict[tuple[HarmonicTruncation, int, int], TorusSampling] = {}
+        self._lattices: dict[tuple[HarmonicTruncation, int, int, int], TorusSampling] = {}
         self._one_by_one: dict[int, HarmonicBalanceModel] = {}
-        self.loses_contact = LAWS[waves.assembly.mesh_model].loses_contact
+        self._varying_bearings: list[UnequalBearings | None] = []
         self.bearings: BearingWaves | None = None
         self._bearing_means: tuple[BearingMean, ...] = ()
         ports = []
@@ -129,6 +135,15 @@ class HarmonicBalanceModel:
         self.signal_names: tuple[SignalName, ...] = (*self._row_names, *mesh_signal_names(waves))
         if self.radiated is not None:
             self.signal_names += (SURFACE_VELOCITY,)
+
+    @property
+    def larger(self) -> LineSet:
+        """Lines that samples keep apart where forces are evaluated in time: products of two lines among them."""
+        if self._larger is None:
+            own = self._lines_within(self._reach, products=True, neighbours=min(self.waves.neighbours, KEPT_APART))
+            # Neighbours farther off are few, and only those that a state has.
+            self._larger = joined(own, self.lines) if self.waves.neighbours > KEPT_APART else own
+        return self._larger
 
     @property
     def shuttles(self) -> bool:
@@ -240,7 +255,7 @@ class HarmonicBalanceModel:
     def sampling(self) -> TorusSampling:
         """Samples on which forces are evaluated in time."""
         least = max(self._least, SAMPLES_PER_HARMONIC * self._reach.harmonics if self.is_nonlinear else 0)
-        key = self._reach, least, self.waves.passing
+        key = self._reach, least, self.waves.passing, len(self.larger.index)
         known = self._lattices.get(key)
         if self.waves.passing:
             known = rank1_lattice(self.lines, self.larger, least, shared=True)
@@ -271,13 +286,14 @@ class HarmonicBalanceModel:
         if not clear:
             other._least = 0
         if reach != self._reach:
-            other._reach, other.larger, other._least = reach, self._lines_within(reach, products=True), 0
+            other._reach, other._larger, other._least = reach, None, 0
         return other
 
     def with_system(self, system: MeanSystem) -> HarmonicBalanceModel:
         """Copy with another averaged system of the same coordinates, such as one with another damping."""
         other = self._copied()
         other.waves = replace(self.waves, system=system)
+        other._varying_bearings = []
         return other
 
     @cached_property
@@ -293,6 +309,8 @@ class HarmonicBalanceModel:
         """Copy with some of its orders, selected by a mask (n,)."""
         other = self._copied()
         other.lines = self.lines.part(which)
+        if self.waves.neighbours:
+            other._larger = None
         return other
 
     def _lines_within(
@@ -343,14 +361,13 @@ class HarmonicBalanceModel:
         """Copy with the usual lines of other harmonics of each mesh frequency."""
         other = self._copied()
         combinations = self._usual.combinations
-        other.harmonics, other._least = 2 * harmonics, 0
+        other.harmonics, other._least, other._larger = 2 * harmonics, 0, None
         other._usual = other._reach = HarmonicTruncation(2 * harmonics, combinations)
         if self.waves.neighbours:  # those beside the known lines are known to be needed
             more = self._lines_within(HarmonicTruncation(harmonics, combinations // 2), neighbours=0)
             other.lines = joined(self.lines, more)
             return other
         other.lines = self._lines_within(HarmonicTruncation(harmonics, combinations // 2))
-        other.larger = self._lines_within(other._usual, products=True)
         return other
 
     @cached_property
@@ -359,8 +376,7 @@ class HarmonicBalanceModel:
         other = self._copied()
         usual = self._usual
         other.lines = self._lines_within(HarmonicTruncation(usual.harmonics, usual.combinations // 2))
-        other._reach = HarmonicTruncation(2 * usual.harmonics, usual.combinations)
-        other.larger = self._lines_within(other._reach, products=True)
+        other._reach, other._larger = HarmonicTruncation(2 * usual.harmonics, usual.combinations), None
         return other
 
     def _copied(self) -> HarmonicBalanceModel:
@@ -396,7 +412,7 @@ class HarmonicBalanceModel:
         known = self.lines if waves.passing else beside(self.lines, slow, 0)
         other.lines = joined(known, beside(loud, slow, more))
         # Of products that lie farther off in both senses little is left.
-        other.larger = joined(joined(beside(whole, slow, 1), beside(loud, slow, more + 1)), other.lines)
+        other._larger = joined(joined(beside(whole, slow, 1), beside(loud, slow, more + 1)), other.lines)
         return other
 
     def places_in(self, other: HarmonicBalanceModel) -> tuple[Integers, ...]:
@@ -448,9 +464,19 @@ class HarmonicBalanceModel:
         return tuple(own for own in self.families if own.planets is not None and own.count > own.planets.waves)
 
     @cached_property
+    def varying_waves(self) -> Booleans:
+        """Components (m,) of these families, among those of the meshes."""
+        found = np.zeros(len(self.waves.waves), dtype=bool)
+        for family in self.varying:
+            found[family.waves] = True
+        return found
+
+    @property
     def varying_bearings(self) -> UnequalBearings | None:
         """What bearings of planets that are not alike have beyond the averaged system; None without any."""
-        return varying_bearings(self.system)
+        if not self._varying_bearings:
+            self._varying_bearings.append(varying_bearings(self.system))
+        return self._varying_bearings[0]
 
     @cached_property
     def _along_bearings(self) -> Floats:

@@ -2,16 +2,10 @@
 
 Orders are converted to samples on a lattice of the bases' angles, the models are evaluated there, and their forces are
 converted back to orders. Newton's method solves the balance, each step by GMRES on the tangents along the lattice.
-
-Harmonic balance does not show stability. The largest growth rate follows from two methods: a first-order estimate for
-all pairs of modes at once, which finds the speeds of combination instability of two modes and a mesh harmonic (Hsu
-1963), and Floquet exponents of the whole system at one speed, one base at a time, the meshes of others at their mean.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -19,15 +13,28 @@ import numpy as np
 
 from exugear.steady.balance.interface import Interface
 from exugear.steady.balance.model import HarmonicBalanceModel
+from exugear.steady.balance.passing_planets import (
+    PassingPlanets,
+    PlanetBearings,
+    VaryingPart,
+    carried_readings,
+)
 from exugear.steady.balance.response import Response, rates_of
-from exugear.steady.harmonics.branches import exponents, kicks_needed
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError, solve_lines
 from exugear.steady.harmonics.lines import TorusSampling
 from exugear.steady.mean_system.bearing_waves import COMPONENTS
-from exugear.steady.mean_system.mean_system import mean_modes, most_rolling
-from exugear.steady.mean_system.mesh_places import BACK, DEFLECTION, FRONT, MISALIGNMENT, POSITION, MeshPlaces
+from exugear.steady.mean_system.mesh_places import (
+    BACK,
+    DEFLECTION,
+    FRONT,
+    MISALIGNMENT,
+    POSITION,
+    MeshPlaces,
+    slopes_over_turn,
+)
 from exugear.steady.mean_system.sampled_laws import (
     LawSamples,
+    add_resistance,
     sample_curve,
     sample_line,
     sample_rolling,
@@ -36,7 +43,6 @@ from exugear.steady.mean_system.sampled_laws import (
     sample_wandering_line,
     widened,
 )
-from exugear.system.modes import fastest_growth, state_matrix
 from fe_ste.tools.arrays import Complexes, Floats, Integers
 
 BALANCED = 1e-8
@@ -63,7 +69,29 @@ class HarmonicResidual:
     @cached_property
     def static(self) -> Complexes:
         """Readings (n, m, r) of the static state with friction."""
-        return self.interface.static
+        if self._bearings is None:
+            return self.interface.static
+        return self.interface.static - self._read_of_bearings(self._bearings.given)
+
+    @cached_property
+    def _bearings(self) -> PlanetBearings | None:
+        """Bearings that vary with the carrier; None without any."""
+        return None if self.model.varying_bearings is None else PlanetBearings(self.model, self.interface)
+
+    @cached_property
+    def along_bearings(self) -> Complexes:
+        """Readings (n, m, r, c) under a unit of force along each coordinate of these bearings."""
+        return self.interface.read(self.interface.along_bearings)
+
+    def _read_of_bearings(self, forces: Complexes) -> Complexes:
+        """Find readings (n, m, r) under forces (n, c) along these coordinates."""
+        return np.asarray(np.einsum("nmrc,nc->nmr", self.along_bearings, forces))
+
+    def bearing_forces(self, excess: Complexes) -> Complexes:
+        """Return forces (n, c) of these bearings beyond the averaged system, under forces (n, m, f) of the laws."""
+        if self._bearings is None:
+            return np.zeros((len(excess), 0), dtype=complex)
+        return self._bearings.given + self._bearings.forces(excess)
 
     @cached_property
     def places(self) -> MeshPlaces:
@@ -79,7 +107,12 @@ class HarmonicResidual:
         found = np.zeros(self.interface.ports.forces.shape[:2])
         m = self.meshes
         model = self.model
-        found[:m, DEFLECTION] = model.waves.mean_stiffness * model.pressed(self.interface.ports.static)
+        static = self.interface.ports.static
+        found[:m, DEFLECTION] = model.waves.mean_stiffness * model.pressed(static)
+        if self._tilting.any():
+            stiffness, _, moment = self._tilting.T
+            found[:m, MISALIGNMENT] = stiffness * static[:m, MISALIGNMENT]
+            found[:m, MISALIGNMENT] -= moment * [wave.wave == 0 for wave in model.waves.waves]
         if self.interface.bearings is not None:
             found[m:, :COMPONENTS] = self.interface.bearings.load
         return found
@@ -95,6 +128,25 @@ class HarmonicResidual:
     def meshes(self) -> int:
         """Number of the meshes' waves, behind which those of bearings follow."""
         return len(self.model.waves.waves)
+
+    @cached_property
+    def _dampers(self) -> Floats:
+        """Damping (m,) along the deflections that the laws have in time, and the averaged system in the mean, N s/m.
+
+        That of tables comes and goes; that of laws along a row varies with the carrier where their stiffness does.
+        """
+        in_time = self.model.varying_waves | self.model.loses_contact
+        return np.where(in_time, self.model.waves.damping, 0.0)
+
+    @property
+    def _reads_rates(self) -> bool:
+        """Whether laws read rates, too."""
+        return self.model.loses_contact or bool(self._dampers.any())
+
+    @cached_property
+    def _tilting(self) -> Floats:
+        """Resistance to misalignment (m, 3) that varies with the carrier, as `MeshWaves.tilting` has it."""
+        return np.zeros((self.meshes, 3)) if self.model.loses_contact else self.model.cycles.varying_tilting
 
     @cached_property
     def _curved(self) -> bool:
@@ -167,7 +219,10 @@ class HarmonicResidual:
                 whole[:, POSITION] += places.positions[:, u]
                 found.append(sample_table(meshes, waves.waves[n].first, whole, rates[:, u]))
             else:
-                found.append(self._sample_row(n, readings[:, u], stiffness[..., u]))
+                samples = self._sample_row(n, readings[:, u], stiffness[..., u])
+                if self.model.varying_waves[n]:
+                    add_resistance(samples, readings[:, u], rates[:, u], self._dampers[n], *self._tilting[n])
+                found.append(samples)
         shape = self.interface.ports.forces.shape[1], readings.shape[2]
         found = [widened(samples, *shape) for samples in found]
         return LawSamples(*(np.stack(samples, axis=1) for samples in zip(*found, strict=True)))
@@ -197,7 +252,7 @@ class HarmonicResidual:
     def _sample_readings(self, readings: Complexes) -> tuple[Floats, Floats]:
         """Sample (s, m, r) readings and of their rates, the latter zero where no law asks for them."""
         values = self.sampling.values(readings)
-        if not self.model.loses_contact:
+        if not self._reads_rates:
             return values, np.zeros_like(values)
         return values, self.sampling.values(rates_of(self.model, self.interface.speed, readings))
 
@@ -228,12 +283,10 @@ class HarmonicResidual:
 
     @cached_property
     def _dragged(self) -> Complexes:
-        """Forces (n, m, f) of the dampers under deviations of gears, which laws along a row do not have."""
+        """Forces (n, m, f) under deviations of gears by the dampers that are in the averaged system alone."""
         found = np.zeros((len(self.static), *self.interface.ports.forces.shape[:2]), dtype=complex)
-        waves = self.model.waves
-        if not self.model.loses_contact:
-            own = self.model.deviations(self.interface.speed)
-            found[:, : self.meshes, DEFLECTION] = -waves.damping * rates_of(self.model, self.interface.speed, own)
+        rates = rates_of(self.model, self.interface.speed, self.model.deviations(self.interface.speed))
+        found[:, : self.meshes, DEFLECTION] = (self._dampers - self.model.waves.damping) * rates
         return found
 
     @cached_property
@@ -250,7 +303,7 @@ class HarmonicResidual:
         back = self.places.back
         moved, moving = self._sample_readings(step)
         found = np.einsum("sufr,sur->suf", sampled.slope, there @ moved)
-        if self.model.loses_contact:
+        if self._reads_rates:
             found += np.einsum("sufr,sur->suf", sampled.damping, there @ moving)
         return np.asarray(self.sampling.coefficients(back @ found) - self._mean_slopes(step))
 
@@ -279,10 +332,10 @@ class HarmonicResidual:
         """Subtract the slopes of the averaged system from slopes (..., m, f, m, r)."""
         waves = self.model.waves
         at = np.arange(self.meshes)
+        if self._tilting.any():
+            slopes[..., at, MISALIGNMENT, at, MISALIGNMENT] -= self._tilting[:, int(by_rates)]
         if by_rates:
-            # The damper of laws along a row is the same in the mean system; that of a table comes and goes.
-            if self.model.loses_contact:
-                slopes[..., at, DEFLECTION, at, DEFLECTION] -= waves.damping
+            slopes[..., at, DEFLECTION, at, DEFLECTION] -= self._dampers
             return
         slopes[..., at, DEFLECTION, at, DEFLECTION] -= waves.mean_stiffness
         if self.interface.bearings is not None:
@@ -335,8 +388,12 @@ class HarmonicResidual:
         deflection = change[:, :m, DEFLECTION]
         found = np.zeros((len(change), *self.interface.ports.forces.shape[:2]), dtype=complex)
         found[:, :m, DEFLECTION] = waves.mean_stiffness * deflection
-        if self.model.loses_contact:
-            found[:, :m, DEFLECTION] += waves.damping * rates_of(self.model, self.interface.speed, deflection)
+        if self._reads_rates:
+            found[:, :m, DEFLECTION] += self._dampers * rates_of(self.model, self.interface.speed, deflection)
+        if self._tilting.any():
+            stiffness, damping, _ = self._tilting.T
+            tilt = change[:, :m, MISALIGNMENT]
+            found[:, :m, MISALIGNMENT] += stiffness * tilt + damping * rates_of(self.model, self.interface.speed, tilt)
         if self.interface.bearings is not None:
             slope = self.interface.bearings.slope
             own = change[:, m:, :COMPONENTS]
@@ -366,7 +423,8 @@ class HarmonicResidual:
         """Find the readings -G F (n, m, r) under forces (n, m, f)."""
         shape = self.interface.readings.shape
         matrix = self.interface.readings.reshape(shape[0], shape[1] * shape[2], shape[3] * shape[4])
-        return np.asarray(-(matrix @ excess.reshape(shape[0], -1, 1))).reshape(shape[:3])
+        found = np.asarray(-(matrix @ excess.reshape(shape[0], -1, 1))).reshape(shape[:3])
+        return found if self._bearings is None else found - self._read_of_bearings(self._bearings.forces(excess))
 
 
 @dataclass(frozen=True, eq=False)
@@ -387,14 +445,24 @@ class Tangent:
     def solved(self, right: Complexes, tolerance: float = STEP_TOLERANCE) -> tuple[Complexes, int]:
         """Solve for readings (n, m, r) that change what is missing by `right`, and count the products that it takes.
 
-        The balance of each line by itself, solved exactly, leaves GMRES what varying laws do between lines.
+        The balance of each line by itself, solved exactly, leaves GMRES what varying laws do between lines. Where
+        stiffness varies with the carrier, lines are solved with those beside them.
         """
         lengths = self.balance.model.lengths
+        passing = self._passing
+
+        def solved(wanted: Complexes) -> Complexes:
+            found = self.alone(wanted)
+            if passing is not None:
+                rest = np.zeros((len(found), self.balance.interface.along_bearings.shape[2]), dtype=complex)
+                flat = found.reshape(len(found), -1)
+                found = passing.solve(np.hstack([flat, rest]))[:, : flat.shape[1]].reshape(found.shape)
+            return lengths * found
 
         def apply(scaled: Complexes) -> Complexes:
-            return lengths * self.alone(self.missing(scaled / lengths))
+            return solved(self.missing(scaled / lengths))
 
-        found, products = solve_lines(apply, lengths * self.alone(right), tolerance)
+        found, products = solve_lines(apply, solved(right), tolerance)
         return found / lengths, products
 
     def alone(self, right: Complexes) -> Complexes:
@@ -403,6 +471,41 @@ class Tangent:
         found = right.reshape(len(right), -1).copy()
         found[:, read] = (self._inverse @ found[:, read, None])[..., 0]
         return found.reshape(right.shape)
+
+    @cached_property
+    def _passing(self) -> PassingPlanets | None:
+        """Coupling of lines by the slopes of the laws in their mean over time; None where nothing varies."""
+        balance = self.balance
+        model, interface = balance.model, balance.interface
+        if not model.varying:
+            return None
+        n, m, r = balance.static.shape
+        f = interface.ports.forces.shape[1]
+        means = np.array(balance.places.means)
+        parts = []
+        columns: list[int] = []
+        for family in model.varying:
+            of_places = means == family.first
+            slope, damping = (
+                values[:, of_places].mean(axis=0) for values in (self.sampled.slope, self.sampled.damping)
+            )
+            stiffness, damper = (slopes_over_turn(family, values, interface.speed) for values in (slope, damping))
+            stiffness[family.turns] = 0.0  # the mean is in what each line answers by itself
+            own = slice(r * family.first, r * (family.first + family.count))
+            parts.append(VaryingPart(own, stiffness, damper, carried_readings(model, interface.speed, family, r)))
+            columns += range(f * family.first, f * (family.first + family.count))
+        forces = np.array(columns)
+        answers = interface.readings.reshape(n, m * r, m * f)[:, :, forces]
+        if model.varying_bearings is not None:
+            parts.append(PlanetBearings.part(model, interface, m * r))
+            at = model.varying_bearings.coordinates
+            moved = interface.motion[:, at].reshape(n, len(at), m * f)[:, :, forces]
+            along = interface.along_bearings
+            read_there = balance.along_bearings.reshape(n, m * r, -1)
+            answers = np.block([[answers, read_there], [moved, along[:, at]]])
+        read = balance.read
+        answers[:, read] = self._inverse @ answers[:, read]
+        return PassingPlanets(model, interface, parts, answers)
 
     @cached_property
     def _inverse(self) -> Complexes:
@@ -520,7 +623,8 @@ def response_of_readings(balance: HarmonicResidual, readings: Complexes, product
         force = excess[:, :m, 0] + waves.mean_stiffness * deflection + waves.damping * rates
         force[0] -= waves.mean_stiffness * waves.rest
     free = _free_shares(balance, whole)
-    return Response(interface, deflection, excess, force * waves.line_of_action, products, apart, free)
+    of_bearings = balance.bearing_forces(excess)
+    return Response(interface, deflection, excess, force * waves.line_of_action, products, apart, free, of_bearings)
 
 
 def _free_shares(balance: HarmonicResidual, whole: Floats) -> Floats:
@@ -547,126 +651,3 @@ def _mean_of_waves(there: Floats, back: Floats, slopes: Floats) -> Floats:
         mean = np.tensordot(turning, slopes[:, u], axes=(0, 0)) / samples
         found[own[:, None], :, own] += mean
     return found
-
-
-SMOOTH_KICKS, PARTING_KICKS = 400, 1000
-"""Minimum number of kicks per period, without and with contact loss, whose instants have to be resolved."""
-CHECKED = 3
-"""Candidates whose Floquet exponents are computed."""
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A speed at which two modes and a harmonic of a mesh frequency may work together."""
-
-    speed: float
-    """Of the input, rad/s."""
-    base: int
-    harmonic: int
-    """Which mesh frequency, and the multiple of it that is the sum or difference of both modes' frequencies."""
-    growth: float
-    """Estimate of the fastest growth there, 1/s."""
-
-
-def candidates(model: HarmonicBalanceModel, low: float, high: float) -> tuple[Candidate, ...]:
-    """Find combination resonances between two speeds (rad/s), the fastest growing first, to first order."""
-    middle = 0.5 * (low + high)
-    values, right, left = mean_modes(model.system, middle)
-    size = model.system.size
-    ports = model.ports_at(middle)
-    felt = left[:, size:] @ np.linalg.solve(model.system.mass, model.loads(ports).astype(complex))
-    felt = felt.reshape(len(felt), len(model.waves.waves), -1)
-    seen = right[:, :size] @ np.moveaxis(ports.readings, (0, 1, 2), (2, 0, 1))
-    decay = -values.real
-    frequency = values.imag
-    slow = min(abs(low), abs(high))
-    found = []
-    for base, order in enumerate(model.waves.base_orders):
-        of_base = np.array([wave.base == base for wave in model.waves.waves])
-        for harmonic in range(1, model.harmonics + 1):
-            tangents = {at: of_base * values[:, harmonic] for at, values in model.cycles.tangents.items()}
-            turned = {at: values.conj() for at, values in tangents.items()}
-            for sign in (1.0, -1.0):
-                there = _couple_modes(felt, tangents, seen.conj() if sign > 0.0 else seen)
-                back = there.conj() if sign > 0.0 else _couple_modes(felt, turned, seen)
-                product = there * back.T
-                growth = -0.5 * (decay[:, None] + decay) + np.real(
-                    np.sqrt(0.25 * (decay[:, None] - decay) ** 2 + product)
-                )
-                speed = (frequency[:, None] + sign * frequency) / (harmonic * order)
-                inside = (speed >= slow) & (speed <= max(abs(low), abs(high))) & (speed > 0.0)
-                if inside.any():
-                    i, j = np.unravel_index(np.argmax(np.where(inside, growth, -np.inf)), growth.shape)
-                    at = float(np.copysign(speed[i, j], middle))
-                    found.append(Candidate(at, base, harmonic, float(growth[i, j])))
-    return tuple(sorted(found, key=lambda candidate: -candidate.growth))
-
-
-def _couple_modes(felt: Complexes, tangents: Mapping[tuple[int, int], Complexes], seen: Complexes) -> Complexes:
-    """Couple modes (k, k) by tangents (m,) of forces by readings; what they feel (k, m, f) and make seen (r, k, m)."""
-    parts = [(felt[..., force] * tangent) @ seen[read].T for (force, read), tangent in tangents.items()]
-    return np.asarray(np.sum(parts, axis=0))
-
-
-def growth_at(balance: HarmonicResidual, readings: Complexes, base: int, least: int = SMOOTH_KICKS) -> float:
-    """Return the largest growth rate, 1/s, of a disturbance of a steady state, by Floquet exponents over one base.
-
-    Parameters
-    ----------
-    balance : at the speed
-    readings : (n, m, r) inputs of the models in the steady state
-    base : base that varies
-    least : minimum number of kicks per period
-    """
-    model = balance.model
-    interface = balance.interface
-    system = model.system
-    ports = interface.ports
-    size = system.size
-    speed = interface.speed
-    period = 2.0 * np.pi / (abs(speed) * float(model.waves.base_orders[base]))
-    values = system.eigenvalues(speed)
-    kicks = max(kicks_needed(float(np.abs(values).max()) / 2.0 / np.pi, period), least)
-    varying = balance.tangents_along(readings, base, kicks)
-    pushes = np.vstack(
-        [np.zeros((size, varying.shape[1])), np.linalg.solve(system.mass, model.loads(ports))],
-    )
-    rows = ports.readings.reshape(-1, size)
-    # Rates of the waves as their meshes see them: those in the frame, and what the turning carries along.
-    carried = speed * np.tensordot(model.partners, ports.readings, axes=1).reshape(-1, size)
-    by_rates = np.zeros_like(rows) if ports.rates is None else ports.rates.reshape(-1, size)
-    reads = np.block([[rows, by_rates], [carried, rows]])
-    # Meshes of other bases do not vary: they belong to the constant part. Bearings do with all bases.
-    of_base = np.ones(len(model.weights), dtype=bool)
-    of_base[: len(model.waves.waves)] = [wave.base == base for wave in model.waves.waves]
-    pushed = np.repeat(of_base, ports.forces.shape[1])
-    read = np.tile(np.repeat(of_base, ports.readings.shape[1]), 2)
-    constant = state_matrix(system.mass, system.damping_at(speed), system.stiffness_at(speed))
-    constant -= pushes[:, ~pushed] @ varying[0][np.ix_(~pushed, ~read)] @ reads[~read]
-    # Many slopes are zero: what nothing pushes along or reads costs nothing then.
-    pushed = pushed & varying.any(axis=(0, 2))
-    read = read & varying.any(axis=(0, 1))
-    varying = varying[:, pushed][:, :, read]
-    pushes = pushes[:, pushed]
-    reads = reads[read]
-    found, shapes = exponents(constant, pushes, reads, varying, period)
-    # Free rolling neither grows nor decays but for what the losses change with the speed: it is known by its shape.
-    return float(np.delete(found, most_rolling(system, shapes[:size])).real.max())
-
-
-def growth_of_state(balance: HarmonicResidual, readings: Complexes, parted: bool) -> float:
-    """Return the largest growth rate of a disturbance of a steady state over the bases, 1/s.
-
-    Parameters as of `growth_at`; `parted` is True with contact loss. NaN where planets mesh out of phase, and where
-    gears with deviations lose contact: angles of shafts are then excitations in addition to the mesh cycle.
-    """
-    model = balance.model
-    if model.waves.carriers or (parted and model.deviations(balance.interface.speed).any()):
-        return math.nan
-    least = PARTING_KICKS if parted else SMOOTH_KICKS
-    return max(growth_at(balance, readings, base, least) for base in range(len(model.waves.base_orders)))
-
-
-def mean_growth(model: HarmonicBalanceModel) -> float:
-    """Largest growth rate of the averaged system over its speeds, 1/s; free rotation excluded."""
-    return max(fastest_growth(model.system.eigenvalues(float(speed))) for speed in model.system.speeds)

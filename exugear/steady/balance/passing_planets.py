@@ -23,6 +23,7 @@ are.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -31,7 +32,7 @@ import scipy.linalg
 from exugear.steady.balance.interface import Interface
 from exugear.steady.balance.model import HarmonicBalanceModel, turns_of_carrier
 from exugear.steady.harmonics.lines import Group, HarmonicCoupling
-from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, CycleFunctions
+from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, CycleFunctions, Family
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
 
 
@@ -52,25 +53,29 @@ class SolvedGroups(NamedTuple):
     """(g, n, k, s) all readings under a unit of each of these forces."""
 
 
+class VaryingPart(NamedTuple):
+    """What couples the s readings of some meshes or bearings at multiples of the carrier's angle, from -t to t."""
+
+    readings: slice
+    """Among all readings."""
+    stiffness: Complexes
+    damping: Complexes
+    """(2 t + 1, f, s) of f forces, by the readings and by their rates."""
+    carried: Floats
+    """(s, s) what laws see of the readings in their rates beside the derivatives: `MeshWaves.partners`, 1/s."""
+
+
 class PassingPlanets:
     """Coupling of lines by stiffness that varies with the carrier at one speed; n lines, k readings, s that vary.
 
-    Readings are those of all meshes, and behind them coordinates of the bearings that vary.
-
     Parameters
     ----------
-    functions : (q, s, s) by group of `HarmonicBalanceModel.whole_coupling`: stiffness beyond the averaged system
-    answers : (n, k, k) readings of each line under a unit of each force
-    lengths : (k,) what a reading counts as a length; readings are given as lengths
+    parts : with f forces together; the mean of their damping is in the averaged system
+    answers : (n, k, f) readings of each line under a unit of each of these forces
     """
 
     def __init__(
-        self,
-        model: HarmonicBalanceModel,
-        interface: Interface,
-        functions: Sequence[Complexes],
-        answers: Complexes,
-        lengths: Floats,
+        self, model: HarmonicBalanceModel, interface: Interface, parts: Sequence[VaryingPart], answers: Complexes
     ) -> None:
         self._lines = model.lines
         self._frequencies = interface.frequencies
@@ -78,28 +83,29 @@ class PassingPlanets:
         assert planets is not None
         self._step = planets.passing
         self._carrier = model.varying[0].carrier
-        parts = _varying_parts(model, interface, functions)
-        self._turns = max(len(stiffness) for _, stiffness, _ in parts) // 2
-        self._at = np.concatenate([np.arange(own.start, own.stop) for own, _, _ in parts])
-        stiffness, of_damper = np.zeros((2, 2 * self._turns + 1, len(self._at), len(self._at)), dtype=complex)
-        first = 0
-        for place, of_place, of_rate in parts:
-            own = slice(first, first + place.stop - place.start)
-            turns = slice(self._turns - len(of_place) // 2, self._turns + len(of_place) // 2 + 1)
-            stiffness[turns, own, own] = of_place
-            of_damper[turns, own, own] = of_rate / lengths[place]
-            first = own.stop
-        of_damper[self._turns] = 0.0  # the mean is in the averaged system
+        self._turns = max(len(part.stiffness) for part in parts) // 2
+        self._at = np.concatenate([np.arange(part.readings.start, part.readings.stop) for part in parts])
+        self._carried = scipy.linalg.block_diag(*(part.carried for part in parts))
+        shape = 2 * self._turns + 1, answers.shape[2], len(self._at)
+        stiffness, of_damper = np.zeros((2, *shape), dtype=complex)
+        row = column = 0
+        for part in parts:
+            _, forces, readings = part.stiffness.shape
+            at = np.s_[row : row + forces], np.s_[column : column + readings]
+            beyond = self._turns - len(part.stiffness) // 2
+            turns = slice(beyond, beyond + len(part.stiffness))
+            stiffness[turns, *at] = part.stiffness
+            of_damper[turns, *at] = part.damping
+            row, column = row + forces, column + readings
+        of_damper[self._turns] = 0.0
         self._of_damper = of_damper
-        forces = interface.ports.forces.shape[1]
-        partners = np.zeros((len(lengths),) * 2)
-        of_meshes = forces * len(model.weights)
-        partners[:of_meshes, :of_meshes] = np.kron(model.partners, np.eye(forces))
-        self._carried = interface.speed * partners[np.ix_(self._at, self._at)]
-        bases = model.lines.index.shape[1]
-        group = Group(0, len(self._at), turns_of_carrier(self._turns, self._carrier, bases))
-        self._coupling = HarmonicCoupling(model.lines, (group,))
+        self._stiffness = stiffness
         self._solved_groups = tuple(self._groups(stiffness, answers))
+
+    @cached_property
+    def _coupling(self) -> HarmonicCoupling:
+        multiples = turns_of_carrier(self._turns, self._carrier, self._lines.index.shape[1])
+        return HarmonicCoupling(self._lines, (Group(0, len(self._at), multiples),))
 
     def damper_forces(self, readings: Complexes) -> Complexes:
         """Return the forces (n, k) of dampers beyond those of the averaged system, from readings (n, k)."""
@@ -108,6 +114,10 @@ class PassingPlanets:
         found = np.zeros_like(readings)
         found[:, self._at] = self._coupling.of([self._of_damper], rates)
         return found
+
+    def forces(self, readings: Complexes) -> Complexes:
+        """Return the forces (n, k) along readings (n, k) that all vary."""
+        return self._coupling.of([self._stiffness], readings) + self.damper_forces(readings)
 
     def _groups(self, stiffness: Complexes, answers: Complexes) -> Iterator[SolvedGroups]:
         """Solve the groups of lines with their neighbours, in which the mesh cycle does not vary, by their size.
@@ -161,8 +171,7 @@ class PassingPlanets:
         turns = apart[group, to, of] + self._turns
         rates = 1j * frequencies[..., None, None] * np.eye(count) + self._carried
         blocks = stiffness[turns] + self._of_damper[turns] @ rates[group, of]
-        found = answers[places][..., self._at]
-        answering = np.where(mirrored[..., None, None], found.conj(), found)
+        answering = np.where(mirrored[..., None, None], answers[places].conj(), answers[places])
         matrix = np.zeros((groups, members, count, members, count), dtype=complex)
         # Products of arrays that are not in C order are slow.
         own = np.ascontiguousarray(answering[:, :, self._at])
@@ -183,7 +192,7 @@ class PassingPlanets:
             ]
             found = np.array(own).reshape(*given.shape[:2], -1)
             at, to, of = group.coupled
-            forces = np.zeros_like(found)
+            forces = np.zeros((*found.shape[:2], group.answers.shape[3]), dtype=complex)
             np.add.at(forces, (at, to), (group.blocks @ found[at, of, :, None])[..., 0])
             solved = given - (group.answers @ forces[..., None])[..., 0]
             out[group.lines[group.mirrored]] = solved[group.mirrored].conj()
@@ -191,27 +200,77 @@ class PassingPlanets:
         return out
 
 
-def _varying_parts(
-    model: HarmonicBalanceModel, interface: Interface, functions: Sequence[Complexes]
-) -> list[tuple[slice, Complexes, Complexes]]:
-    """Find the readings of each family of meshes and of the bearings that vary, and what couples these.
+def passing_planets(
+    model: HarmonicBalanceModel,
+    interface: Interface,
+    functions: Sequence[Complexes],
+    answers: Complexes,
+    lengths: Floats,
+) -> PassingPlanets:
+    """Coupling of lines where laws along a row are tangents, with forces along the readings.
 
-    Stiffness and damping (2 turns + 1, s, s) are at multiples of the carrier's angle. What stiffness multiplies are
-    lengths.
+    Parameters
+    ----------
+    functions : (q, s, s) by group of `HarmonicBalanceModel.whole_coupling`: stiffness beyond the averaged system
+    answers : (n, k, k) readings of each line under a unit of each force
+    lengths : (k,) what a reading counts as a length; readings are given as lengths
     """
     forces = interface.ports.forces.shape[1]
     dampers = {(DEFLECTION, DEFLECTION): model.waves.damping[:, None].astype(np.complex128)}
     if model.shuttles:
         dampers[MISALIGNMENT, MISALIGNMENT] = model.cycles.varying_tilting[:, 1:2].astype(np.complex128)
     of_dampers = CycleFunctions(model.waves, model.varying, dampers, forces).at(interface.ports, interface.speed)
-    found = []
+    parts = []
     for family, of_damper in zip(model.varying, of_dampers, strict=True):
         whole = functions[model.families.index(family)]
         over_cycle = whole.reshape(-1, 2 * family.turns + 1, *whole.shape[1:])
-        readings = slice(forces * family.first, forces * (family.first + family.count))
-        found.append((readings, over_cycle[len(over_cycle) // 2], of_damper))
+        own = slice(forces * family.first, forces * (family.first + family.count))
+        carried = carried_readings(model, interface.speed, family, forces)
+        parts.append(VaryingPart(own, over_cycle[len(over_cycle) // 2], of_damper / lengths[own], carried))
     if model.varying_bearings is not None:
-        first = forces * len(model.weights)
-        readings = slice(first, first + len(model.varying_bearings.coordinates))
-        found.append((readings, functions[-1], model.varying_bearings.functions_at(interface.speed)[1]))
-    return found
+        part = PlanetBearings.part(model, interface, forces * len(model.weights))
+        parts.append(part._replace(stiffness=functions[-1], damping=part.damping / lengths[part.readings]))
+    at = np.concatenate([np.arange(part.readings.start, part.readings.stop) for part in parts])
+    return PassingPlanets(model, interface, parts, answers[..., at])
+
+
+def carried_readings(model: HarmonicBalanceModel, speed: float, family: Family, readings: int) -> Floats:
+    """Return what laws see of a family's readings in their rates as the carrier turns, (count r, count r), 1/s."""
+    return np.asarray(speed * np.kron(model.waves.partners[family.waves, family.waves], np.eye(readings)))
+
+
+class PlanetBearings:
+    """Bearings that vary with the carrier, taken out of the balance of laws in time; n lines, c coordinates.
+
+    Along their coordinates q they have forces b + S q beyond the averaged system, which answers q = q_0 - H_b (b + S q)
+    to them: q_0 is the motion under all other forces, and S couples lines at multiples of the carrier's angle alone.
+    """
+
+    def __init__(self, model: HarmonicBalanceModel, interface: Interface) -> None:
+        bearings = model.varying_bearings
+        assert bearings is not None
+        self._at = bearings.coordinates
+        still = bearings.still_at(model.lines, model.varying[0].carrier, interface.speed)
+        own = interface.along_bearings[:, self._at]
+        self._coupling = PassingPlanets(model, interface, [self.part(model, interface)], own)
+        loads = 0.0 if interface.loads is None else interface.loads.motion[:, self._at]
+        self._of_meshes = interface.motion[:, self._at].reshape(len(own), len(self._at), -1)
+        self.given = still + self._varying(loads - (own @ still[..., None])[..., 0])
+        """(n, c) forces where laws have none beyond the averaged system."""
+
+    @staticmethod
+    def part(model: HarmonicBalanceModel, interface: Interface, first: int = 0) -> VaryingPart:
+        """Return what couples the coordinates, which are readings from a first one on."""
+        bearings = model.varying_bearings
+        assert bearings is not None
+        count = len(bearings.coordinates)
+        stiffness, damping = bearings.functions_at(interface.speed)
+        return VaryingPart(slice(first, first + count), stiffness, damping, np.zeros((count, count)))
+
+    def forces(self, excess: Complexes) -> Complexes:
+        """Return the forces (n, c) that laws' forces (n, m, f) beyond the averaged system cause, without `given`."""
+        return self._varying(-(self._of_meshes @ excess.reshape(len(excess), -1, 1))[..., 0])
+
+    def _varying(self, motion: Complexes) -> Complexes:
+        """Return the forces (n, c) S q where the averaged system without them moves by (n, c)."""
+        return self._coupling.forces(self._coupling.solve(motion))

@@ -23,7 +23,7 @@ import numpy as np
 
 from exugear.steady.balance.interface import Interface
 from exugear.steady.balance.model import HarmonicBalanceModel
-from exugear.steady.balance.passing_planets import PassingPlanets
+from exugear.steady.balance.passing_planets import PassingPlanets, passing_planets
 from exugear.steady.harmonics.linear_solvers import solve_lines
 from exugear.steady.harmonics.lines import add_answered, flat
 from exugear.steady.mean_system.bearing_waves import TILTS
@@ -371,7 +371,7 @@ class LineBalance:
         self._octets = np.empty(2 * SIZE)
         self.passing = passing
         if model.varying and passing is None:
-            self.passing = PassingPlanets(model, interface, self._functions, answers, lengths)
+            self.passing = passing_planets(model, interface, self._functions, answers, lengths)
 
     def _apply(self, readings: Complexes) -> Complexes:
         out = np.empty_like(readings)

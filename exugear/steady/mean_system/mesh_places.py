@@ -77,7 +77,8 @@ def mesh_places(waves: MeshWaves, speed: float, positions: Floats, angles: Float
         column = len(waves.base_orders) + carriers.index(planets.carrier) if planets and wave.ahead else None
         number = sum(other.first == wave.first for other in waves.waves)
         shapes = wave_shapes(planets, speed, None if column is None else angles[:, column], number)
-        rows, columns = among_waves(shapes, first, count, (len(angles),) if turning else ())
+        norms = planets.norms(number) if planets and column is not None else None
+        rows, columns = among_waves(shapes, first, count, (len(angles),) if turning else (), norms)
         there.append(rows)
         back.append(columns)
         means += [first] * shapes.shape[-2]
@@ -105,19 +106,24 @@ def wave_shapes(planets: PlanetSet | None, speed: float, turned: Floats | None, 
     return np.stack([np.ones_like(theta), np.cos(theta), np.sin(theta)], axis=1)
 
 
-def among_waves(shapes: Floats, first: int, count: int, samples: tuple[int, ...]) -> tuple[Floats, Floats]:
+def among_waves(
+    shapes: Floats, first: int, count: int, samples: tuple[int, ...], norms: Floats | None = None
+) -> tuple[Floats, Floats]:
     """Values in places p by those of all `count` waves (..., p, count), and back, for some waves from `first` on.
 
     Parameters
     ----------
     shapes : (..., p, waves) of these waves in the places
     samples : shape of the samples over which the shapes turn; empty if they are constant
+    norms : (waves,) mean sum of their squares over the places; by default that of these shapes
     """
+    if norms is None:
+        norms = (shapes**2).sum(axis=-2, keepdims=True)
     waves = slice(first, first + shapes.shape[-1])
     rows = np.zeros((*shapes.shape[:-1], count))
     columns = np.zeros((*shapes.shape[:-2], count, shapes.shape[-2]))
     rows[..., waves] = shapes
-    columns[..., waves, :] = np.swapaxes(shapes / (shapes**2).sum(axis=-2, keepdims=True), -1, -2)
+    columns[..., waves, :] = np.swapaxes(shapes / norms, -1, -2)
     return np.broadcast_to(rows, (*samples, *rows.shape[-2:])), np.broadcast_to(
         columns, (*samples, *columns.shape[-2:])
     )
@@ -281,6 +287,18 @@ def wave_products(family: Family, speed: float) -> Complexes:
     first = there[..., : family.planets.waves if family.planets is not None and family.carrier >= 0 else None]
     products = np.einsum("snv,snw,snx->svwx", there / norms, first, first)
     return np.asarray(np.fft.fft(products, axis=0)[turns] / len(products))
+
+
+def slopes_over_turn(family: Family, slopes: Floats, speed: float) -> Complexes:
+    """Find what slopes (places, f, r) at the planets are between the waves, (2 turns + 1, count f, count r).
+
+    Multiples of the carrier's angle are from -turns to turns; `speed` is that of the input, rad/s.
+    """
+    samples = SAMPLED * max(family.turns, 1)
+    there, norms = _shapes_over_turn(family, speed, samples)
+    found = np.einsum("suv,ufr,suw->svfwr", there / norms, slopes, there, optimize=True)
+    spectrum = np.fft.fft(found, axis=0)[np.arange(-family.turns, family.turns + 1)] / samples
+    return np.asarray(spectrum.reshape(len(spectrum), family.count * slopes.shape[1], -1))
 
 
 class CycleFunctions:

@@ -12,7 +12,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from exugear.steady.mean_system.mesh_places import BACK, BACK_TILT, CENTRE, FRONT, POSITION, TILT
+from exugear.steady.mean_system.mesh_places import (
+    BACK,
+    BACK_TILT,
+    CENTRE,
+    DEFLECTION,
+    FRONT,
+    MISALIGNMENT,
+    POSITION,
+    TILT,
+)
 from exugear.system.kernels.meshes import MeshArrays
 from exugear.system.kernels.rolling import (
     ELASTIC_PART,
@@ -168,6 +177,33 @@ def sample_wandering_curve(curve: Floats, readings: Floats, load: float) -> LawS
     across[:, POSITION] -= way_slope * force + beyond_slope
     slope = np.stack([along, across], axis=1)
     return LawSamples(np.stack([force, -way * force - beyond], axis=1), slope, np.zeros_like(slope))
+
+
+def add_resistance(
+    samples: LawSamples,
+    readings: Floats,
+    rates: Floats,
+    damping: float,
+    tilt_stiffness: float,
+    tilt_damping: float,
+    moment: float,
+) -> None:
+    """Add the damper of a model along a row, and its resistance to misalignment where it has a moment along it.
+
+    Parameters
+    ----------
+    readings, rates : (s, r) with the misalignment (rad) behind the deflection (m); rates per second
+    damping : N s/m
+    tilt_stiffness, tilt_damping, moment : N m/rad, N m s/rad and N m, as `MeshWaves.tilting` has them
+    """
+    force, slope, damper = samples
+    force[:, DEFLECTION] += damping * rates[:, DEFLECTION]
+    damper[:, DEFLECTION, DEFLECTION] += damping
+    if force.shape[1] > MISALIGNMENT:
+        force[:, MISALIGNMENT] += tilt_stiffness * readings[:, MISALIGNMENT] - moment
+        force[:, MISALIGNMENT] += tilt_damping * rates[:, MISALIGNMENT]
+        slope[:, MISALIGNMENT, MISALIGNMENT] += tilt_stiffness
+        damper[:, MISALIGNMENT, MISALIGNMENT] += tilt_damping
 
 
 def _moved(values: Floats, moved: Floats) -> tuple[Floats, Floats]:

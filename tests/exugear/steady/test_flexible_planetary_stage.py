@@ -17,6 +17,7 @@ from exugear.steady.mean_system.mean_system import MeanSystem, mean_modes, mean_
 from exugear.steady.mean_system.mesh_waves import mesh_waves
 from exugear.steady.mean_system.planet_sets import SteadyError, planet_sets
 from exugear.steady.mean_system.symmetric_carriers import symmetric_carrier
+from exugear.steady.point_solver import PointSolver
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.settling import frame_coordinates
 from exugear.steady.steady_response import response_of
@@ -187,10 +188,11 @@ def test_a_run_with_orders_of_shafts_stays_on_its_steady_state(grc, stiffness, f
 
 
 @pytest.mark.validation
+@pytest.mark.parametrize("method", ["parametric", "nonlinear"])
 @pytest.mark.parametrize("speed", [7.4, SPEED])
-def test_a_run_that_starts_on_the_steady_state_stays_there(solver, speed):
+def test_a_run_that_starts_on_the_steady_state_stays_there(drum, method, speed):
     """RK4 at 1/200 kHz. Passing planets are the largest order of the transmission error."""
-    complex_error, _ = apart(solver, speed, 0.9, 5e-6, 0.6, solver.model.waves.assembly)
+    complex_error, _ = apart(solver_of(drum, RANGE, method, 6), speed, 0.9, 5e-6, 0.6, drum)
     assert complex_error < 1e-3
 
 
@@ -285,32 +287,38 @@ def by_order(model, values):
     return found
 
 
-@pytest.mark.parametrize("method", ["linear", "nonlinear"])
-def test_methods_without_the_variation_of_the_ring_are_refused_by_name(drum, method):
+def test_the_method_without_the_variation_of_the_ring_is_refused_by_name(drum):
     with pytest.raises(SteadyError, match="use --method parametric"):
-        response_of(drum, SteadySettings(SpeedRange(*RANGE, 2), method))
+        response_of(drum, SteadySettings(SpeedRange(*RANGE, 2), "linear"))
+
+
+TEN_SPEEDS = (4.3, 6.0, 8.2, 10.0, 12.4, 14.1, 16.0, 18.3, 20.1, 22.0)
 
 
 @pytest.fixture(scope="module")
 def whole(grc, stiffness):
-    """Solver of the GRC with all bodies flexible, 336 coordinates."""
+    """GRC with all bodies flexible, 336 coordinates, with the neighbours of orders that are needed."""
     assembly = assembled(grc, Choice("flexible"), stiffness)
-    return solver_of(assembly, (4.0, 22.5), "parametric", 12, 2)
+    model = solver_of(assembly, (4.0, 22.5), "parametric", 12, 2).model
+    return with_needed_neighbours(model, np.array(TEN_SPEEDS[::2]))[0]
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    ("speed", "most"),
-    [(speed, 2.5e-3) for speed in (4.3, 6.0, 8.2, 10.0, 12.4, 14.1, 16.0, 20.1, 22.0)] + [(18.3, 6e-3)],
-)
-def test_runs_of_the_grc_with_all_bodies_flexible_stay_on_their_steady_state(whole, speed, most):
+@pytest.mark.parametrize("method", ["parametric", "nonlinear"])
+@pytest.mark.parametrize("speed", TEN_SPEEDS)
+def test_runs_of_the_grc_with_all_bodies_flexible_stay_on_their_steady_state(whole, speed, method):
     """RK4 at 1/96 kHz. Amplitudes of all orders of the overall error together, over their size.
 
     At 18.3 rad/s the first order of the planetary stage excites a mode of 0.7 % damping to 0.7 mm, so that what is of
-    second order counts more. At most other speeds passing planets, 43 um at three times the carrier's order, are the
-    largest.
+    second order counts more: `parametric` is 5e-3 off, `nonlinear` 5e-5. At most other speeds passing planets, 43 um at
+    three times the carrier's order, are the largest. At 10 rad/s twice the order of the planetary stage excites a mode
+    of 0.3 % damping.
     """
-    assert apart(whole, speed, 1.5, 1.04e-5, 0.9, whole.model.waves.assembly)[1] < most
+    most = 1e-3 if speed != 10.0 else 1.5e-3
+    if method == "parametric":
+        most = 2e-3 if speed != 18.3 else 6e-3
+    solver = PointSolver(whole, method)
+    assert apart(solver, speed, 1.5, 1.04e-5, 0.9, whole.waves.assembly)[1] < most
     if speed == 10.0:
-        overall = 2.0 * np.abs(signals(whole.model, whole.response(speed))[1:, 0])
-        assert whole.model.lines.orders[1:][np.argmax(overall)] == pytest.approx(3.0)
+        overall = 2.0 * np.abs(signals(whole, solver.response(speed))[1:, 0])
+        assert whole.lines.orders[1:][np.argmax(overall)] == pytest.approx(3.0)
