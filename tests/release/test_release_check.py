@@ -104,7 +104,7 @@ def test_the_commands_of_the_page_on_releases_set_the_version_everywhere(checks:
     subprocess.run(["sh", "-e"], input="\n".join(commands), cwd=tree, text=True, check=True)
     result = checks.same_version(tree)
     assert result.state == "pass", result.details
-    assert result.text.startswith("0.4.0 of 20")
+    assert result.text.startswith("0.5.0 of 20")
     told = checks.changelog(tree)
     assert told.state == "pass", "all entries of Unreleased stand under the version"
     for check in (checks.known_versions, checks.recipes, checks.pythons):
