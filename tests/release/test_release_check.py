@@ -101,6 +101,7 @@ def test_the_commands_of_the_page_on_releases_set_the_version_everywhere(checks:
     page = (tree / "docs" / "development" / "releasing.md").read_text(encoding="utf-8")
     commands = [line.strip() for line in page.splitlines() if line.startswith(("    VERSION=", "    sed -i "))]
     assert len(commands) > 6
+    changed(tree, "CHANGELOG.md", "## [Unreleased]\n", "## [Unreleased]\n\n- An entry of the next version.\n")
     subprocess.run(["sh", "-e"], input="\n".join(commands), cwd=tree, text=True, check=True)
     result = checks.same_version(tree)
     assert result.state == "pass", result.details
