@@ -2,17 +2,21 @@
 
 Names the versions that are not tried. Ends with 1 if any that is tried fails, or none is.
 
-    python packaging/try_wheel.py dist/exugear-*.whl [--all] [--constraint requirements.lock]
+    python packaging/try_wheel.py dist/exugear-*.whl [--all] [--constraint requirements.lock] [--hour PAGE]
+
+With `--hour` these are the commands of a user's first hour, and the page gets a table of what each takes.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -20,6 +24,17 @@ VERSIONS = ("3.11", "3.12", "3.13")
 LONGEST = 1800
 """Seconds that one step may take."""
 GRC = "share/exugear/cases/grc750/gearbox.toml"
+FIRST_HOUR = (
+    "new first.toml --kind parallel",
+    "check first.toml",
+    "ste first.toml",
+    "modes first.toml",
+    "steady first.toml",
+    "run first.toml",
+    "report results --levers",
+)
+"""Commands of the first hour in an empty folder; all but the first two write into `results`."""
+TABLE = re.compile(r"(<!-- written by packaging/try_wheel.py -->\n).*?(<!-- end of the table -->)", re.DOTALL)
 
 
 def interpreters(every: bool) -> dict[str, str]:
@@ -62,10 +77,7 @@ def try_wheel(python: str, wheel: Path, constraint: Path | None) -> None:
     """
     with tempfile.TemporaryDirectory() as scratch:
         home = Path(scratch)
-        run(home, python, "-m", "venv", "env")
-        own = home / "env" / ("Scripts" if os.name == "nt" else "bin")
-        limits = ["--constraint", str(constraint.resolve())] if constraint else []
-        run(home, own / "python", "-m", "pip", "install", "-q", "--disable-pip-version-check", *limits, wheel.resolve())
+        own = installed(home, python, wheel, constraint)
         exugear = own / "exugear"
         where = run(home, own / "python", "-c", "import exugear, fe_ste; print(exugear.__file__, fe_ste.__file__)")
         assert all(Path(path).is_relative_to(home.resolve()) for path in where.split()), where
@@ -81,6 +93,45 @@ def try_wheel(python: str, wheel: Path, constraint: Path | None) -> None:
             run(home, exugear, "check", f"{kind}.toml")
         run(home, exugear, "ste", "pair.toml", "--positions", "8", "--out", "results")
         run(home, exugear, "check", home / "env" / GRC)
+
+
+def installed(home: Path, python: str, wheel: Path, constraint: Path | None, extras: str = "") -> Path:
+    """Install a wheel, with extras such as ``[all]``, into a fresh environment; return the folder of its programs."""
+    run(home, python, "-m", "venv", "env")
+    own = home / "env" / ("Scripts" if os.name == "nt" else "bin")
+    limits = ["--constraint", str(constraint.resolve())] if constraint else []
+    what = f"{wheel.resolve()}{extras}"
+    run(home, own / "python", "-m", "pip", "install", "-q", "--disable-pip-version-check", *limits, what)
+    return own
+
+
+def first_hour(python: str, wheel: Path, constraint: Path | None) -> dict[str, float]:
+    """Wall time of the installation and of each command of the first hour, s."""
+    with tempfile.TemporaryDirectory() as scratch:
+        home = Path(scratch)
+        begin = time.perf_counter()
+        own = installed(home, python, wheel, constraint, "[all]")
+        found = {"installation with the extra `all`": time.perf_counter() - begin}
+        work = home / "work"
+        work.mkdir()
+        for command in FIRST_HOUR:
+            begin = time.perf_counter()
+            run(work, own / "exugear", *command.split())
+            found[f"`exugear {command}`"] = time.perf_counter() - begin
+        assert (work / "results" / "report.html").is_file()
+    return found
+
+
+def write_hours(page: Path, hours: dict[str, dict[str, float]]) -> None:
+    """Write times by version and step into the table of a page."""
+    steps = list(next(iter(hours.values())))
+    rows = [f"| {time.strftime('%Y-%m-%d')}, wall time in s | {' | '.join(hours)} |", "| --- " * (1 + len(hours)) + "|"]
+    rows += [f"| {step} | {' | '.join(f'{own[step]:.1f}' for own in hours.values())} |" for step in steps]
+    text, count = TABLE.subn(
+        lambda found: found[1] + "\n".join(rows) + "\n" + found[2], page.read_text(encoding="utf-8")
+    )
+    assert count == 1, f"{page} has no place for the table"
+    page.write_text(text, encoding="utf-8")
 
 
 def run(folder: Path, *command: str | Path) -> str:
@@ -113,18 +164,25 @@ def main() -> int:
     parser.add_argument("wheel", type=Path)
     parser.add_argument("--all", action="store_true", help="on every Python that it is for, as far as they are found")
     parser.add_argument("--constraint", type=Path)
+    parser.add_argument("--hour", type=Path, metavar="PAGE", help="time a first hour, and write it into a page")
     given = parser.parse_args()
     found, failed = interpreters(given.all), []
+    hours = {}
     for version, python in found.items():
         begin = _processor_time()
         try:
-            try_wheel(python, given.wheel, given.constraint)
+            if given.hour:
+                hours[f"Python {version}"] = first_hour(python, given.wheel, given.constraint)
+            else:
+                try_wheel(python, given.wheel, given.constraint)
         except (subprocess.SubprocessError, AssertionError) as error:
             failed.append(version)
             print(f"Python {version} ({python}): FAILED: {error}", flush=True)
         else:
             spent = _processor_time() - begin
             print(f"Python {version} ({python}): works, {spent:.0f} s of processor time", flush=True)
+    if hours:
+        write_hours(given.hour, hours)
     for version in VERSIONS:
         if given.all and version not in found:
             print(f"*** Python {version} IS MISSING HERE: the wheel was NOT tried on it ***", flush=True)
