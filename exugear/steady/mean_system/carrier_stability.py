@@ -37,7 +37,10 @@ def growth_over_carrier(system: MeanSystem, speed: float) -> float:
     assert system.over_angle is not None
     places = system.frame.places
     period = float(places[1] * len(places)) / abs(speed)
-    basis = _basis(system, speed)
+    basis = np.eye(system.size)
+    if system.size > LARGEST:
+        stiffness = system.stiffness_at(speed)
+        basis = scipy.linalg.eigh(0.5 * (stiffness + stiffness.T), system.mass, subset_by_index=(0, MODES - 1))[1]
     mass = basis.T @ system.mass @ basis
     dampings, stiffnesses = system.over_angle[0], system.at(system.over_angle[1], speed)
     dampings = basis.T @ (system.damping_at(speed) + dampings - dampings.mean(axis=0)) @ basis
@@ -71,15 +74,6 @@ def exponents_of_turning(
         passage = scipy.linalg.expm(step * constant) @ passage
     multipliers, shapes = scipy.linalg.eig(passage)
     return np.log(multipliers.astype(np.complex128)) / abs(period), shapes[: len(mass)]
-
-
-def _basis(system: MeanSystem, speed: float) -> Floats:
-    """Find the columns (size, n) that span the motion: all coordinates, or undamped modes of the averaged system."""
-    if system.size <= LARGEST:
-        return np.eye(system.size)
-    stiffness = system.stiffness_at(speed)
-    shapes = scipy.linalg.eigh(0.5 * (stiffness + stiffness.T), system.mass, subset_by_index=(0, MODES - 1))[1]
-    return np.asarray(shapes)
 
 
 def _weights(count: int, sense: float) -> Floats:

@@ -219,21 +219,33 @@ def mean_system(assembly: Assembly, speeds: Floats, prepared: Steps | None = Non
     """
     _check(assembly)
     sets = planet_sets(assembly)
-    assembly, spread = _with_equal_planets(with_equal_pins(assembly, sets), sets)
+    assembly = with_equal_pins(assembly, sets)
+    # Catalogue bearings of planets are equal already: this changes anisotropic matrices of the file.
+    supports = [own for planets in sets for own in planet_supports(assembly.supports, planets.names, planets.angles)]
+    connectors, spread = with_equal_planets(assembly.connectors, supports)
+    assembly = replace(assembly, connectors=connectors)
     frame = rotating_frame(assembly, sets)
-    drive, load = _drive_and_load(assembly)
+    case = assembly.gearbox.case
+    # The degree of freedom locked in the file holds the speed: its torque balances the others.
+    keeper = assembly.gearbox.locked[0] if assembly.gearbox.locked else case.overall.input
+    drive = assembly.torque_vector({keeper: 1.0})
+    load = assembly.torque_vector(case.static_load.torques_N_m)
     low = float(np.min(speeds))
     high = float(np.max(speeds))
     low, high = (low, high) if high > low else (low - 0.5 * abs(low), high + 0.5 * abs(high))
     at = np.array([low, 0.5 * (low + high), high])
-    u = _first_guess(assembly, frame, drive)
+    # The first guess is the static state at standstill, rotated back to zero angle of the input.
+    pinned = assembly.spin[case.overall.input]
+    q = static_state(assembly).q
+    rolling = assembly.rolling_velocity(np.zeros(assembly.size), frame.speeds)
+    u = np.asarray(np.linalg.solve(frame.matrices(0.0)[0], q - q[pinned] * rolling))
     torque = 0.0
     rows = []
     # Where stiffness varies with the carrier the static state balances the mean over its places.
     places = frame.places if frame.varies else np.zeros(1)
     matrix = None
     total = len(at) + (len(frame.places) - 1 if sets else 0)
-    report = partial(prepared or _unreported, "linearisation")
+    report = partial(prepared or (lambda words, done, total: None), "linearisation")
     for speed in at:
         u, torque = _static(frame, places, float(speed), drive, load, u, torque, matrix)
         damping, matrix = tangents(frame, 0.0, float(speed), u)
@@ -252,7 +264,6 @@ def mean_system(assembly: Assembly, speeds: Floats, prepared: Steps | None = Non
         stiffnesses = stiffnesses + changes[2].mean(axis=1)
         if frame.varies:
             over_angle = changes[1], changes[2]
-    pinned = assembly.spin[assembly.gearbox.case.overall.input]
     return MeanSystem(
         frame,
         at,
@@ -263,28 +274,10 @@ def mean_system(assembly: Assembly, speeds: Floats, prepared: Steps | None = Non
         torques,
         drive,
         pinned,
-        spread,
+        max(spread, assembly.planet_spread),
         variation,
         over_angle,
     )
-
-
-def _unreported(words: str, done: int, total: int) -> None:
-    """Report no progress."""
-
-
-def _with_equal_planets(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> tuple[Assembly, float]:
-    """Assembly with equal planet bearings, and the largest relative change of stiffness that this required.
-
-    Catalogue bearings are equal already: the change concerns anisotropic matrices of the file.
-    """
-    supports = [
-        planet_support
-        for planets in sets
-        for planet_support in planet_supports(assembly.supports, planets.names, planets.angles)
-    ]
-    connectors, spread = with_equal_planets(assembly.connectors, supports)
-    return replace(assembly, connectors=connectors), max(spread, assembly.planet_spread)
 
 
 def rotating_frame(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> RotatingFrame:
@@ -417,32 +410,10 @@ def _has_sectors(gearbox: Gearbox, mesh: Mesh) -> bool:
     return seat is not None and seat.sectors is not None
 
 
-def _drive_and_load(assembly: Assembly) -> tuple[Floats, Floats]:
-    """Return the generalized force of a unit of the drive's torque, and those of the static load.
-
-    The degree of freedom locked in the file holds the speed: its torque balances the others.
-    """
-    load = assembly.gearbox.case.static_load
-    overall = assembly.gearbox.case.overall
-    locked = assembly.gearbox.locked
-    keeper = locked[0] if locked else overall.input
-    return assembly.torque_vector({keeper: 1.0}), assembly.torque_vector(load.torques_N_m)
-
-
-def _first_guess(assembly: Assembly, frame: RotatingFrame, drive: Floats) -> Floats:
-    """Find the static state at standstill, rotated back to zero angle of the input, in the coordinates of the frame."""
-    q = static_state(assembly).q
-    rolling = assembly.rolling_velocity(np.zeros(assembly.size), frame.speeds)
-    pinned = assembly.spin[assembly.gearbox.case.overall.input]
-    return np.asarray(np.linalg.solve(frame.matrices(0.0)[0], q - q[pinned] * rolling))
-
-
-def _residual(
-    frame: RotatingFrame, psi: float, speed: float, u: Floats, du: Floats | None = None, ddu: Floats | None = None
-) -> Floats:
+def _residual(frame: RotatingFrame, psi: float, speed: float, u: Floats) -> Floats:
     """Generalized forces (size,) in the frame that inertia needs, less those that elements give."""
     assembly = frame.assembly
-    q, v, a = frame.state(psi, speed, u, du, ddu)
+    q, v, a = frame.state(psi, speed, u)
     missing = assembly.inertia_forces(q, v, a) - assembly.forces(q, v, frame.mean_meshes)
     return np.asarray(frame.matrices(psi)[0].T @ missing)
 

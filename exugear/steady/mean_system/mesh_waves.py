@@ -147,7 +147,7 @@ class MeshWaves:
                     abs(planets.ratio),
                     tuple(sorted(bases)),
                     planets.waves,
-                    *_one_of(steps),
+                    next(iter(steps)) if len(steps) == 1 else None,
                     planets.passing if name == self.varying_carrier else 0,
                 ),
             )
@@ -381,6 +381,7 @@ def mesh_waves(system: MeanSystem, passing: int = 0, neighbours: int = NEIGHBOUR
     displaced = displaced_carriers(assembly, frame.sets)
     for meshes, planets in groups:
         mesh = assembly.elements[meshes[0]].mesh
+        turning = frame.speeds.get(mesh.pinion, 0.0) - frame.speeds.get(mesh.frame, 0.0)
         order = frequencies[mesh.name]
         base = next((n for n, known in enumerate(orders) if abs(order - known) < SAME_BASE * known), len(orders))
         if base == len(orders):
@@ -388,7 +389,7 @@ def mesh_waves(system: MeanSystem, passing: int = 0, neighbours: int = NEIGHBOUR
             names.append([])
         if mesh.family not in names[base]:
             names[base].append(mesh.family)
-        sense = math.copysign(1.0, _cycles_per_turn(frame, meshes[0]))
+        sense = math.copysign(1.0, assembly.meshes.cycles[meshes[0]] * turning)
         own = (meshes[0],)
         if planets is None:
             waves.append(MeshWave(mesh.name, mesh.name, *own, 0, 1.0, base, sense, 0.0))
@@ -428,14 +429,6 @@ def mesh_groups(frame: RotatingFrame) -> tuple[tuple[tuple[int, ...], PlanetSet 
     return tuple(out)
 
 
-def _cycles_per_turn(frame: RotatingFrame, mesh: int) -> float:
-    """Mesh cycles per rad of the input, signed."""
-    element = frame.assembly.elements[mesh]
-    speeds = frame.speeds
-    relative = speeds.get(element.mesh.pinion, 0.0) - speeds.get(element.mesh.frame, 0.0)
-    return float(frame.assembly.meshes.cycles[mesh] * relative)
-
-
 def _turns_per_cycle(wave: MeshWave, planets: PlanetSet) -> int | None:
     """Find the carrier's turns that go with a mesh cycle, None where phases are not those of equally spaced planets.
 
@@ -450,11 +443,6 @@ def _turns_per_cycle(wave: MeshWave, planets: PlanetSet) -> int | None:
     if np.abs((ahead - step * np.arange(count) / count + 0.5) % 1.0 - 0.5).max() > IN_PHASE:
         return None
     return int(-step * wave.sense * math.copysign(1.0, wave.carrier)) % count
-
-
-def _one_of(steps: set[int | None]) -> tuple[int | None]:
-    """Return the common step of all meshes of a carrier, None where they differ."""
-    return (next(iter(steps)),) if len(steps) == 1 else (None,)
 
 
 def _rows(assembly: Assembly, q: Floats, rows: Floats) -> tuple[Floats, Floats]:

@@ -42,7 +42,7 @@ from exugear.steady.mean_system.displaced_pins import displaced_carriers, pin_de
 from exugear.steady.mean_system.mesh_waves import MeshWaves
 from exugear.steady.mean_system.planet_sets import PlanetSet
 from exugear.steady.mean_system.standing_loads import reactions
-from exugear.steady.mean_system.unequal_bearings import UnequalBearings, unequal_bearings
+from exugear.steady.mean_system.unequal_bearings import LEAST, UnequalBearings, unequal_bearings
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.system.kernels.meshes import FRAME
 from exugear.system.kernels.turning import travelling_tangent
@@ -62,8 +62,6 @@ REACH = 4
 """Harmonics of each mesh frequency whose sidebands a stated load has at most."""
 ABSENT = 1e-2
 """Share of the variation of a mesh stiffness up to which it counts as without a harmonic, which makes the sidebands."""
-LEAST = 1e-9
-"""Share of the largest coefficient below which one is zero but for round-off."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,16 +276,17 @@ class _Series:
                 orders = self._orders(mesh, end)
                 if not orders:
                     continue
-                body, teeth = self._wheel(mesh, end)
-                frame = self.assembly.elements[mesh].mesh.frame
+                own_mesh = self.assembly.elements[mesh].mesh
+                body = (own_mesh.pinion, own_mesh.gear)[end]
+                teeth = (own_mesh.pair.pinion, own_mesh.pair.gear)[end].teeth
                 turning = self._turning(mesh, end, planets, place, len(own))
                 for (order, value), (turn, shape, row) in itertools.product(orders, turning):
                     if order == 0 and turn < 0:
                         continue  # the conjugate of that which turns the other way
                     # Whole mesh cycles count as such. Orders beside one number of them are sidebands of one kind.
                     whole = round(order / teeth)
-                    nearest = self._key(body, frame, planets, order - teeth * whole, turn)
-                    whole *= int(math.copysign(1.0, self._relative(body, frame)))
+                    nearest = self._key(body, own_mesh.frame, planets, order - teeth * whole, turn)
+                    whole *= int(math.copysign(1.0, self._relative(body, own_mesh.frame)))
                     key = tuple(sorted((*nearest, (self.cycles[base], whole)))) if whole else nearest
                     displaced = np.zeros(len(waves), dtype=complex)
                     displaced[own] = value * shape
@@ -467,12 +466,6 @@ class _Series:
             on_planet=np.array([any(load.body in own.names for own in self.frame.sets) for load in loads], dtype=bool),
             error_pieces=self.assembly.meshes.error_pieces,
         )
-
-    def _wheel(self, mesh: int, end: int) -> tuple[str, int]:
-        """Body and number of teeth of a gear of a mesh."""
-        own = self.assembly.elements[mesh].mesh
-        gear = (own.pair.pinion, own.pair.gear)[end]
-        return (own.pinion, own.gear)[end], gear.teeth
 
     def _orders(self, mesh: int, end: int) -> list[tuple[int, complex]]:
         """Orders of a gear's deviation and their coefficients at zero angle of the input, m."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exugear.steady.mean_system.mean_system import MeanSystem, place_step
+from exugear.steady.mean_system.mean_system import RATE_STEP, MeanSystem, place_step
 from exugear.steady.mean_system.mesh_waves import MeshWaves, wave_name
 from exugear.steady.mean_system.planet_sets import PlanetSet
 from exugear.steady.mean_system.standing_loads import (
@@ -33,8 +33,6 @@ from fe_ste.tools.arrays import Complexes, Floats, Integers, SingleComplexes
 
 AXES = ("x", "y", "z")
 PLANET_AXES = ("radial", "tangential", "z")
-RATE_STEP = 1e-3
-"""Step of central differences by rates."""
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,7 @@ def standing_gears(frame: RotatingFrame) -> tuple[str, ...]:
         gear: None
         for mesh, element in enumerate(assembly.elements)
         for body, gear in _ends(element)
-        if _stands(assembly, body) and not frame.varies_at(mesh)
+        if assembly.gearbox.body(body).fixed and not frame.varies_at(mesh)
     }
     return tuple(found)
 
@@ -102,7 +102,7 @@ def gear_load_rows(waves: MeshWaves) -> tuple[Floats, Floats, Floats]:
             friction = zip(sliding, -element.friction_rows, strict=True)
             for part, rows in ((along, force), (turning, element.misalignment), *friction):
                 for (body, gear), row in zip(_ends(element), rows.reshape(2, BODY_SIZE), strict=True):
-                    if gear in gears and _stands(assembly, body):
+                    if gear in gears and assembly.gearbox.body(body).fixed:
                         first = BODY_SIZE * gears.index(gear)
                         part[number, first : first + BODY_SIZE] -= share * _about_gear(assembly, body, gear, row)
     return along, turning, np.stack(sliding, axis=1)
@@ -112,10 +112,6 @@ def _ends(element: MeshElement) -> tuple[tuple[str, str], tuple[str, str]]:
     """Body and gear of both ends of a mesh."""
     mesh = element.mesh
     return (mesh.pinion, mesh.pair.pinion.name), (mesh.gear, mesh.pair.gear.name)
-
-
-def _stands(assembly: Assembly, body: str) -> bool:
-    return assembly.gearbox.body(body).fixed
 
 
 def _about_gear(assembly: Assembly, name: str, gear: str, row: Floats) -> Floats:
