@@ -212,7 +212,11 @@ class ModeNamer:
     def named(self, shape: Complexes) -> NamedMode:
         """Name a shape (size,) of the averaged system."""
         kinetic = self._kinetic(shape)
-        return NamedMode(self._kind(shape, kinetic), self._words(shape, kinetic), self.whirl(shape))
+        moved = self._turn @ shape
+        strain = np.array([float((moved.conj() @ k @ moved).real) for k in self._elements.values()])
+        share = strain / max(float(strain.sum()), 1e-300)
+        words = mode_name(self.assembly, tuple(self._elements), kinetic, share)
+        return NamedMode(self._kind(shape, kinetic), words, self.whirl(shape))
 
     def whirl(self, shape: Complexes) -> float:
         """Sense of the whirl of a shape (size,), bodies by their lateral and tilting energy; see `NamedMode`."""
@@ -241,11 +245,6 @@ class ModeNamer:
                 moved = (self._turn @ part)[:, None]
                 shares += energy / sum(energies) * kinetic_shares(self.assembly, moved, self._q)[0]
         return shares
-
-    def _words(self, shape: Complexes, kinetic: Floats) -> str:
-        moved = self._turn @ shape
-        strain = np.array([float((moved.conj() @ k @ moved).real) for k in self._elements.values()])
-        return mode_name(self.assembly, tuple(self._elements), kinetic, strain / max(float(strain.sum()), 1e-300))
 
     def _kind(self, shape: Complexes, kinetic: Floats) -> str:
         sets = [planets for planets in self.system.frame.sets if not planets.is_single]
@@ -292,15 +291,29 @@ def circle(x: complex, y: complex) -> float:
     return float(0.0 - 2.0 * (np.conj(x) * y).imag)
 
 
-LAYOUT: dict[str, tuple[str, ...]] = {
-    "campbell_speed": ("campbell_point",),
-    "mode_frequency": ("campbell_point", "mode"),
-    "mode_damping": ("campbell_point", "mode"),
-    "mode_whirl": ("campbell_point", "mode"),
-    "mode_over_angle": ("mode", "bound"),
-    "mode_kind": ("mode",),
-    "mode_name": ("mode",),
+_VARIABLES: dict[str, tuple[str, tuple[str, ...], dict[str, str]]] = {
+    "campbell_speed": ("speeds", ("campbell_point",), {"units": "rad/s", "long_name": "speed of the overall input"}),
+    "mode_frequency": (
+        "frequency",
+        ("campbell_point", "mode"),
+        {"units": "Hz", "long_name": "as seen from the housing"},
+    ),
+    "mode_damping": ("damping", ("campbell_point", "mode"), {"units": "1", "long_name": "share of critical damping"}),
+    "mode_whirl": (
+        "whirl",
+        ("campbell_point", "mode"),
+        {"units": "1", "long_name": "1 forward whirl, -1 backward whirl"},
+    ),
+    "mode_over_angle": (
+        "over_angle",
+        ("mode", "bound"),
+        {"units": "1", "long_name": "lowest and highest over the carrier's angle, over that at zero angle"},
+    ),
+    "mode_kind": ("kinds", ("mode",), {}),
+    "mode_name": ("names", ("mode",), {}),
 }
+"""Fields of a diagram by the variables of a file that holds it, with their dimensions and attributes."""
+LAYOUT = {name: over for name, (_, over, _) in _VARIABLES.items()}
 """Variables of a file that holds a diagram."""
 SAME_FREQUENCY = 0.02
 """Share of a frequency within which a mode is the one that a crossing was found at."""
@@ -337,19 +350,10 @@ class Campbell(ReprMixin, line=": {names!n} modes at {speeds!n} speeds"):
 
     def variables(self) -> dict[str, tuple[tuple[str, ...], Any, dict[str, str]]]:
         """Arrays with dimensions and units, as files hold them."""
-        values = {
-            "campbell_speed": (self.speeds, {"units": "rad/s", "long_name": "speed of the overall input"}),
-            "mode_frequency": (self.frequency, {"units": "Hz", "long_name": "as seen from the housing"}),
-            "mode_damping": (self.damping, {"units": "1", "long_name": "share of critical damping"}),
-            "mode_whirl": (self.whirl, {"units": "1", "long_name": "1 forward whirl, -1 backward whirl"}),
-            "mode_over_angle": (
-                self.over_angle,
-                {"units": "1", "long_name": "lowest and highest over the carrier's angle, over that at zero angle"},
-            ),
-            "mode_kind": (np.array(self.kinds, dtype=object), {}),
-            "mode_name": (np.array(self.names, dtype=object), {}),
+        return {
+            name: (over, np.array(own, dtype=object) if isinstance(own := getattr(self, field), tuple) else own, more)
+            for name, (field, over, more) in _VARIABLES.items()
         }
-        return {name: (LAYOUT[name], array, attributes) for name, (array, attributes) in values.items()}
 
 
 def modes_over_speed(system: MeanSystem, low: float, high: float, highest: float) -> ModeTracks:
@@ -400,7 +404,9 @@ def campbell_of(system: MeanSystem, tracks: ModeTracks) -> Campbell:
     whirl = np.full(tracks.frequency.shape, np.nan)
     for n, m in zip(*np.nonzero(~np.isnan(tracks.frequency)), strict=True):
         whirl[n, m] = namer.whirl(tracks.shapes[n, m])
-    named = [namer.named(tracks.shapes[_fastest(tracks, m), m]) for m in range(tracks.frequency.shape[1])]
+    # Modes are named at the fastest speed at which they are found.
+    found_at = np.where(np.isnan(tracks.frequency), -1.0, np.abs(tracks.speeds)[:, None])
+    named = [namer.named(tracks.shapes[n, m]) for m, n in enumerate(found_at.argmax(axis=0))]
     return Campbell(
         tracks.speeds,
         tracks.frequency,
@@ -414,13 +420,5 @@ def campbell_of(system: MeanSystem, tracks: ModeTracks) -> Campbell:
 
 def campbell_from(data: xr.Dataset) -> Campbell:
     """Read a diagram from the dataset of a file that holds one."""
-    values = {name: data[name].to_numpy() for name in LAYOUT}
-    kinds, names = (tuple(str(value) for value in values[name]) for name in ("mode_kind", "mode_name"))
-    speeds, frequency, damping, whirl, over_angle = (values[name] for name in list(LAYOUT)[:5])
-    return Campbell(speeds, frequency, damping, whirl, over_angle, kinds, names)
-
-
-def _fastest(tracks: ModeTracks, mode: int) -> int:
-    """Place of the fastest speed at which a mode is one."""
-    known = np.flatnonzero(~np.isnan(tracks.frequency[:, mode]))
-    return int(known[np.argmax(np.abs(tracks.speeds[known]))])
+    values: dict[str, Any] = {field: data[name].to_numpy() for name, (field, _, _) in _VARIABLES.items()}
+    return Campbell(**values | {field: tuple(map(str, values[field])) for field in ("kinds", "names")})

@@ -45,12 +45,7 @@ UPPER_ESTIMATE = (
 
 
 def response_findings(data: xr.Dataset) -> tuple[Finding, ...]:
-    """Check a response.
-
-    Parameters
-    ----------
-    data : as `exugear.steady.steady_file.load_response` reads it
-    """
+    """Check a response, as `exugear.steady.steady_file.load_response` reads it."""
     return (*_balance(data), *_speeds(data), *_models(data), *_passing(data), *_excitation(data), *_sound(data))
 
 

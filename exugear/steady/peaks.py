@@ -1,4 +1,7 @@
-"""Peaks of a stored steady-state response: dominant orders by speed, their sidebands, and their height in a run-up."""
+"""Peaks of a stored steady-state response: dominant orders by speed, their sidebands, and their height in a run-up.
+
+Responses are given as `exugear.steady.steady_file.load_response` reads them.
+"""
 
 from __future__ import annotations
 
@@ -72,7 +75,6 @@ def peaks(data: xr.Dataset, signal: str = "overall_dte", least: float = 0.01) ->
 
     Parameters
     ----------
-    data : as `exugear.steady.steady_file.load_response` reads it
     least : share of the highest peak below which a peak is omitted
 
     Raises
@@ -131,8 +133,7 @@ def sidebands(data: xr.Dataset, peak: Peak, signal: str = "overall_dte", least: 
 
     Parameters
     ----------
-    data : as `exugear.steady.steady_file.load_response` reads it
-    peak : of it
+    peak : of the response
     least : share of the peak below which an order is omitted
     """
     point, centre = _place(data, peak)
@@ -173,8 +174,7 @@ def planet_sidebands(
 
     Parameters
     ----------
-    data : as `exugear.steady.steady_file.load_response` reads it
-    peak : of it
+    peak : of the response
     carriers : mapping of family of meshes to (str, float)
         Carrier of the planets and its revolutions per revolution of the input.
     least : share of the common force of all planets, or of the largest order, below which an order is omitted
@@ -231,10 +231,6 @@ def pulls(data: xr.Dataset) -> tuple[TensileMesh, ...]:
 
     The orders of a speed are added at angles of the input drawn at random (`DRAWN`, the same each time). For planets it
     is the planet with the largest unloading by the multi-blade components.
-
-    Parameters
-    ----------
-    data : as `exugear.steady.steady_file.load_response` reads it
     """
     found = []
     for mesh, shares in tensile_fractions(data).items():
@@ -288,10 +284,6 @@ def bearing_swings(data: xr.Dataset) -> tuple[BearingLoadExcursion, ...]:
 
     The orders of a speed are added as if in phase, along the static load. Planet bearings, whose load rotates in fixed
     axes, are not checked.
-
-    Parameters
-    ----------
-    data : as `exugear.steady.steady_file.load_response` reads it
     """
     swings = []
     for bearing, shares in dynamic_load_ratios(data).items():
@@ -366,7 +358,12 @@ def compared_peaks(
     alone = orders[np.count_nonzero(index, axis=1) == 1]
     found = [peak for peak in peaks(data, signal) if np.abs(alone - peak.order).min() < SAME_ORDER * peak.order][:most]
     cuts = {peak.order: cut(OrderLine(peak.line, peak.order)) for peak in found}
-    heard = [_amplitude_near(cuts[peak.order], abs(peak.speed)) for peak in found]
+    heard = []
+    for peak in found:
+        own = cuts[peak.order]
+        # A run-up that does not pass the speed of a peak has no amplitude there.
+        passed = np.abs(np.abs(own.speed) / abs(peak.speed) - 1.0) <= SWEEP_SHIFT
+        heard.append(float(np.abs(own.amplitude[passed]).max(initial=0.0)))
     louder = np.argsort(np.argsort([-amplitude for amplitude in heard], kind="stable"), kind="stable")
     out = []
     for peak, amplitude, place in zip(found, heard, louder, strict=True):
@@ -374,9 +371,3 @@ def compared_peaks(
         severity = None if damping is None else sweep_severity(peak.frequency, damping, rate * peak.order)
         out.append(ComparedPeak(peak, damping, amplitude, severity, int(place) + 1))
     return tuple(out)
-
-
-def _amplitude_near(cut: OrderCut, speed: float) -> float:
-    """Largest amplitude of a cut near a speed, zero where it does not pass."""
-    passed = np.abs(np.abs(cut.speed) / speed - 1.0) <= SWEEP_SHIFT
-    return float(np.abs(cut.amplitude[passed]).max(initial=0.0))

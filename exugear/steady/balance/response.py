@@ -123,10 +123,13 @@ def linear_response(model: HarmonicBalanceModel, interface: Interface) -> Respon
     """
     excess = transmission_errors(model, interface.ports, interface.speed)
     excess[..., DEFLECTION] += mean_deviation_forces(model, interface.speed)
-    answer = _answer(interface, excess)[..., DEFLECTION]
-    for _ in range(BEARINGS_REPEATED if model.shaft_orders.bearings else 0):
-        interface = with_unequal_bearings(model, interface, _motion(interface, excess.reshape(len(excess), -1)))
     forces = excess.reshape(len(excess), -1)
+    if excess.shape[2] == 1:
+        answer = -np.einsum("nij,nj->ni", interface.deflection[..., 0], forces)
+    else:
+        answer = -(interface.deflection_per_force @ forces[..., None]).reshape(excess.shape)[..., DEFLECTION]
+    for _ in range(BEARINGS_REPEATED if model.shaft_orders.bearings else 0):
+        interface = with_unequal_bearings(model, interface, _motion(interface, forces))
     return _response(model, interface, interface.static[..., DEFLECTION] + answer, forces, 0)
 
 
@@ -276,7 +279,9 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
     repeated = bool(model.shaft_orders.sidebands or model.varying)
     balance = LineBalance(model, interface, answers, lengths)
     passing = balance.passing
-    of_bearings = _static_bearing_forces(model, interface.speed)
+    of_bearings = np.zeros((shape[0], 0), dtype=complex)
+    if model.varying_bearings is not None:
+        of_bearings = model.varying_bearings.still_at(model.lines, model.varying[0].carrier, interface.speed)
     given = given_forces(model, interface) + deviation_forces(model, interface, passing)
     moved = np.zeros_like(given)
     slow = SlowChanges(model, interface) if repeated else None
@@ -318,14 +323,6 @@ def _still(interface: Interface, shape: tuple[int, ...], coordinates: Integers, 
         moved = np.zeros((shape[0], len(coordinates))) if loads is None else loads.motion[:, coordinates]
         found = np.hstack([found, moved])
     return lengths * found
-
-
-def _static_bearing_forces(model: HarmonicBalanceModel, speed: float) -> Complexes:
-    """Find forces (n, c) in the static state of the bearings that vary with the carrier."""
-    bearings = model.varying_bearings
-    if bearings is None:
-        return np.zeros((len(model.lines.index), 0), dtype=complex)
-    return bearings.still_at(model.lines, model.varying[0].carrier, speed)
 
 
 def _is_settled(found: Complexes, before: Complexes) -> bool:
@@ -418,13 +415,6 @@ def given_forces(model: HarmonicBalanceModel, interface: Interface) -> Complexes
     if model.shuttles:
         products[0, :, MISALIGNMENT] += model.cycles.varying_tilting[:, 2] * [wave.wave == 0 for wave in waves.waves]
     return products
-
-
-def _answer(interface: Interface, excess: Complexes) -> Complexes:
-    """Find the readings -G F (n, m, f) that laws along a row push along, under their forces (n, m, f)."""
-    if excess.shape[2] == 1:
-        return np.asarray(-np.einsum("nij,nj->ni", interface.deflection[..., 0], excess[..., 0]))[..., None]
-    return np.asarray(-(interface.deflection_per_force @ excess.reshape(len(excess), -1, 1))).reshape(excess.shape)
 
 
 def _response(

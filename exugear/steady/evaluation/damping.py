@@ -31,7 +31,6 @@ def damping_extremes(
     response: xr.Dataset,
     settings: SteadySettings,
     run_up: MeasuredRunUp,
-    resolved: float = RESOLVED,
 ) -> SingleComplexes:
     """Amplitudes (2, points, lines, signals) of the compared orders with the lowest and the highest damping.
 
@@ -44,7 +43,6 @@ def damping_extremes(
     response : with the load over speed
     settings : those of the response
     run_up : the run-up whose channels and orders are compared
-    resolved : largest error of the response itself between those speeds, relative to its highest amplitude
     """
     from scipy.interpolate import CubicSpline
 
@@ -54,7 +52,7 @@ def damping_extremes(
     places = np.array([*rows.values()])
     names = [str(name) for name in response["signal"].to_numpy()]
     ascending, transfer = transfers_of(run_up, names, speed, lines, [complex_amplitudes(response)[:, places]])
-    solved = ascending[resolving_places(ascending, transfer.reshape(-1, ascending.size).T, resolved)]
+    solved = ascending[resolving_places(ascending, transfer.reshape(-1, ascending.size).T, RESOLVED)]
     found = np.zeros((2, *response["amplitude"].shape), dtype=np.complex64)
     for end in (0, 1):
         damped = models.damped(end)

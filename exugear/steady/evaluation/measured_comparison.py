@@ -223,7 +223,7 @@ class MeasuredComparison(ReprMixin):
         """
         Store(path, self.input_hash).write_dataset(self._dataset())
         cuts = write_table(path.with_name(f"{path.stem}-cuts.csv"), CUT_HEADINGS, self._cut_rows())
-        peaks = [[_cell(value) for value in self.peak_summary(peak).values()] for peak in self.peaks]
+        peaks = [["" if value is None else value for value in self.peak_summary(peak).values()] for peak in self.peaks]
         table = write_table(path.with_name(f"{path.stem}-peaks.csv"), PEAK_HEADINGS, peaks)
         foreign = [[own.order, own.amplitude, own.prominence] for own in self.foreign]
         headings = ("order", "amplitude", "above_neighbours_dB")
@@ -439,7 +439,3 @@ def _draw_waterfall(cuts: ComparedCuts, channel: int, ax: Axes | None) -> Axes:
 
 def _known(value: float) -> float | None:
     return value if math.isfinite(value) else None
-
-
-def _cell(value: float | str | None) -> float | str:
-    return "" if value is None else value

@@ -209,7 +209,11 @@ def read_run_up(gearbox: Gearbox, name: str | None = None) -> MeasuredRunUp:
     path = recording_path(gearbox, name)
     source = section.tacho or section.speed
     assert source is not None  # checked with the section
-    files = {own: _files_of(own, channel) for own, channel in section.channels.items()}
+    # Names in the file of a channel: its own, or those of its two encoders.
+    files = {
+        own: tuple(encoder.channel for encoder in channel.encoders) if channel.encoders else (channel.channel or own,)
+        for own, channel in section.channels.items()
+    }
     try:
         recording = read_recording(path, list(dict.fromkeys([source.channel, *chain(*files.values())])))
     except RecordingError as error:
@@ -233,7 +237,8 @@ def read_run_up(gearbox: Gearbox, name: str | None = None) -> MeasuredRunUp:
             )
             continue
         recorded = recording.channel(files[own][0])
-        factor = _factor(gearbox, f"{key}.channels.{own}", channel, recorded)
+        factor = _unit(gearbox, f"{key}.channels.{own}", channel.unit, recorded, channel.quantity).factor
+        factor *= 1.0 if channel.full_scale is None else channel.full_scale
         if channel.body is not None:
             torque = MeasuredTorque.of(channel.body, factor * recorded.values[part], shaft.speed)
             continue
@@ -335,11 +340,6 @@ def _shaft_angle(
         raise gearbox.error(f"{key}.{kind}.channel = {channel!r}: {error}") from None
 
 
-def _files_of(name: str, channel: MeasuredChannelSection) -> tuple[str, ...]:
-    """Names in the file of a channel: its own, or those of its two encoders."""
-    return tuple(own.channel for own in channel.encoders) if channel.encoders else (channel.channel or name,)
-
-
 def _error_by_encoders(
     gearbox: Gearbox,
     key: str,
@@ -380,12 +380,6 @@ def _unit(gearbox: Gearbox, key: str, stated: str | None, recorded: RecordedChan
             f"{examples}"
         )
     return unit
-
-
-def _factor(gearbox: Gearbox, key: str, section: MeasuredChannelSection, recorded: RecordedChannel) -> float:
-    """Factor from the values of a recording to SI."""
-    unit = _unit(gearbox, key, section.unit, recorded, section.quantity)
-    return unit.factor * (1.0 if section.full_scale is None else section.full_scale)
 
 
 def _measured(name: str, section: MeasuredChannelSection) -> MeasuredChannel:
