@@ -181,19 +181,6 @@ TURNING = tuple(BODY_MOTIONS.index(name) for name in ("spin", "axial", "twist", 
 """Motions of a central body in rotational modes; all others are those of translational ones."""
 
 
-@dataclass(frozen=True)
-class NamedMode:
-    """Description of a mode as text."""
-
-    kind: str
-    """Of `KINDS`, `MIXED`, or empty where no planet set carries the mode; with the carrier where there are several."""
-    name: str
-    """Kinetic energy by body and strain energy by element."""
-    whirl: float
-    """1 for a circular orbit in the sense of rotation of the body, -1 against it, 0 for a straight orbit and where
-    radial motion of rotating bodies is negligible."""
-
-
 class ModeNamer:
     """Names the modes of the averaged system; its elements are linearised once, about the static state at one speed.
 
@@ -209,17 +196,24 @@ class ModeNamer:
         self._elements = linearise(self.assembly, self._q, frame.mean_meshes).stiffness
         self._senses = {name: float(np.sign(ratio * speed)) for name, ratio in frame.speeds.items()}
 
-    def named(self, shape: Complexes) -> NamedMode:
-        """Name a shape (size,) of the averaged system."""
+    def named(self, shape: Complexes) -> tuple[str, str]:
+        """Return kind and name of a shape (size,) of the averaged system.
+
+        The kind is one of `KINDS`, `MIXED`, or empty where no planet set carries the mode; with the carrier where there
+        are several. The name has the kinetic energy by body and the strain energy by element.
+        """
         kinetic = self._kinetic(shape)
         moved = self._turn @ shape
         strain = np.array([float((moved.conj() @ k @ moved).real) for k in self._elements.values()])
         share = strain / max(float(strain.sum()), 1e-300)
-        words = mode_name(self.assembly, tuple(self._elements), kinetic, share)
-        return NamedMode(self._kind(shape, kinetic), words, self.whirl(shape))
+        return self._kind(shape, kinetic), mode_name(self.assembly, tuple(self._elements), kinetic, share)
 
     def whirl(self, shape: Complexes) -> float:
-        """Sense of the whirl of a shape (size,), bodies by their lateral and tilting energy; see `NamedMode`."""
+        """Sense of the whirl of a shape (size,), bodies by their lateral and tilting energy.
+
+        It is 1 for a circular orbit in the sense of rotation of the body, -1 against it, 0 for a straight orbit and
+        where radial motion of rotating bodies is negligible.
+        """
         circling = total = 0.0
         energy = np.diag(self.system.mass)
         for body in self.assembly.bodies:
@@ -328,14 +322,14 @@ class Campbell(ReprMixin, line=": {names!n} modes at {speeds!n} speeds"):
     frequency: Floats
     damping: Floats
     whirl: Floats
-    """(n, m) Hz as seen from the housing, share of critical damping, and sense of the whirl as `NamedMode` has it;
+    """(n, m) Hz as seen from the housing, share of critical damping, and sense of the whirl as of `ModeNamer.whirl`;
     NaN where a mode is none."""
     over_angle: Floats
     """(m, 2) lowest and highest frequency over the angle of the carrier, over that at zero angle, as
     `frequencies_over_angle` finds them."""
     kinds: tuple[str, ...]
     names: tuple[str, ...]
-    """As `NamedMode` has them, at the fastest speed."""
+    """As of `ModeNamer.named`, at the fastest speed."""
 
     def mode_at(self, speed: float, frequency: float) -> int | None:
         """Find the mode that has a frequency (Hz) at a speed (rad/s), None where none is near."""
@@ -413,8 +407,8 @@ def campbell_of(system: MeanSystem, tracks: ModeTracks) -> Campbell:
         tracks.damping,
         whirl,
         frequencies_over_angle(system, tracks),
-        tuple(mode.kind for mode in named),
-        tuple(mode.name for mode in named),
+        tuple(kind for kind, _ in named),
+        tuple(name for _, name in named),
     )
 
 

@@ -213,31 +213,37 @@ def _place(data: xr.Dataset, peak: Peak) -> tuple[int, int]:
 
 
 @dataclass(frozen=True)
-class TensileMesh:
-    """A mesh with tensile force: in reality the teeth lose contact, which a bilateral model neglects."""
+class Excess:
+    """A mesh or a bearing whose load is outside the range of a linear model at some of the speeds."""
 
-    mesh: str
-    """Name; of planets the family."""
+    name: str
+    """Mesh or bearing; of planets the family."""
     count: int
     """At how many of the speeds."""
     speed: float
-    """Of the input where it pulls longest, rad/s."""
+    """Of the input where the share is largest, rad/s."""
     share: float
-    """Of the time there."""
+    """Share of the time with tensile mesh force; maximum reduction of a bearing's static load by the vibration."""
 
 
-def pulls(data: xr.Dataset) -> tuple[TensileMesh, ...]:
+def _excesses(data: xr.Dataset, shares: Mapping[str, Floats]) -> tuple[Excess, ...]:
+    """Return what has shares (n,) above zero at any of the speeds, the largest share first."""
+    found = [
+        Excess(name, int((own > 0.0).sum()), float(data["speed"][int(own.argmax())]), float(own.max()))
+        for name, own in shares.items()
+        if own.max() > 0.0
+    ]
+    return tuple(sorted(found, key=lambda excess: -excess.share))
+
+
+def pulls(data: xr.Dataset) -> tuple[Excess, ...]:
     """Return the meshes whose force changes its sign relative to the static force, longest tensile time first.
 
-    The orders of a speed are added at angles of the input drawn at random (`DRAWN`, the same each time). For planets it
-    is the planet with the largest unloading by the multi-blade components.
+    In reality their teeth lose contact, which a bilateral model neglects. The orders of a speed are added at angles of
+    the input drawn at random (`DRAWN`, the same each time). For planets it is the planet with the largest unloading by
+    the multi-blade components.
     """
-    found = []
-    for mesh, shares in tensile_fractions(data).items():
-        most = int(np.argmax(shares))
-        if shares[most] > 0.0:
-            found.append(TensileMesh(mesh, int((shares > 0.0).sum()), float(data["speed"][most]), float(shares[most])))
-    return tuple(sorted(found, key=lambda pull: -pull.share))
+    return _excesses(data, tensile_fractions(data))
 
 
 def tensile_fractions(data: xr.Dataset) -> dict[str, Floats]:
@@ -266,32 +272,14 @@ def _pulling(data: xr.Dataset, places: list[int]) -> Floats:
     return shares
 
 
-@dataclass(frozen=True)
-class BearingLoadExcursion:
-    """A linear bearing with so large load amplitudes about the static load that it is outside the linear range."""
-
-    bearing: str
-    count: int
-    """At how many of the speeds."""
-    speed: float
-    """Speed of the input at the largest amplitude, rad/s."""
-    share: float
-    """Maximum reduction of the static load by the vibration; from 1 on the bearing is unloaded."""
-
-
-def bearing_swings(data: xr.Dataset) -> tuple[BearingLoadExcursion, ...]:
+def bearing_swings(data: xr.Dataset) -> tuple[Excess, ...]:
     """Return linear bearings whose vibration reaches `STRAINED` of the static load or more, the largest ratio first.
 
-    The orders of a speed are added as if in phase, along the static load. Planet bearings, whose load rotates in fixed
-    axes, are not checked.
+    They are outside their linear range, and unloaded from a ratio of 1 on. The orders of a speed are added as if in
+    phase, along the static load. Planet bearings, whose load rotates in fixed axes, are not checked.
     """
-    swings = []
-    for bearing, shares in dynamic_load_ratios(data).items():
-        most = int(np.nanargmax(shares))
-        if shares[most] >= STRAINED:
-            count = int((shares >= STRAINED).sum())
-            swings.append(BearingLoadExcursion(bearing, count, float(data["speed"][most]), float(shares[most])))
-    return tuple(sorted(swings, key=lambda swing: -swing.share))
+    ratios = dynamic_load_ratios(data)
+    return _excesses(data, {name: np.where(own >= STRAINED, own, 0.0) for name, own in ratios.items()})
 
 
 def dynamic_load_ratios(data: xr.Dataset) -> dict[str, Floats]:

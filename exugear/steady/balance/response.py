@@ -295,8 +295,12 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
         products += more
         excess = whole + balance.forces(found)
         deflection = (found / lengths)[:, :of_meshes].reshape(shape)[..., DEFLECTION]
-        if before is not None and not model.varying and _is_settled(found, before):
-            break
+        if before is not None and not model.varying:
+            # Forces by moving positions are products of deflections and positions: a relative change c of both changes
+            # them by 2 c, and these forces have themselves changed the solution by c.
+            change = float(np.linalg.norm(found - before) / np.linalg.norm(found))
+            if 2.0 * change**2 < TOLERANCE:
+                break
         if again and slow is not None:
             moved = slow.forces(deflection, _motion(interface, excess))
         if again and model.shaft_orders.bearings:
@@ -323,16 +327,6 @@ def _still(interface: Interface, shape: tuple[int, ...], coordinates: Integers, 
         moved = np.zeros((shape[0], len(coordinates))) if loads is None else loads.motion[:, coordinates]
         found = np.hstack([found, moved])
     return lengths * found
-
-
-def _is_settled(found: Complexes, before: Complexes) -> bool:
-    """Return whether positions that move with a solution would change it by less than the residual.
-
-    Their forces are products of deflections and positions: a relative change c of both changes them by 2 c, and these
-    forces have themselves changed the solution by c.
-    """
-    change = float(np.linalg.norm(found - before) / np.linalg.norm(found))
-    return 2.0 * change**2 < TOLERANCE
 
 
 class LineBalance:

@@ -67,19 +67,16 @@ def exponents_of_turning(
     array([-1., -1.])
     """
     step = abs(period) / STEPS
-    weights = _weights(len(dampings), math.copysign(1.0, period))
+    count = len(dampings)
+    turns = np.fft.fftfreq(count, 1.0 / count)
+    angles = np.outer(math.copysign(1.0, period) * 2.0 * np.pi * (np.arange(STEPS) + 0.5) / STEPS, turns)
+    # Of an even number of angles the highest harmonic is a cosine.
+    phases = np.where(2 * turns == -count, np.cos(angles), np.exp(1j * angles))
+    # Values at the middle of each step are those at even angles with weights (steps, count), by Fourier series.
+    weights = (phases @ np.fft.fft(np.eye(count), axis=0)).real / count
     passage = np.eye(2 * len(mass))
     for own in weights:
         constant = state_matrix(mass, np.tensordot(own, dampings, axes=1), np.tensordot(own, stiffnesses, axes=1))
         passage = scipy.linalg.expm(step * constant) @ passage
     multipliers, shapes = scipy.linalg.eig(passage)
     return np.log(multipliers.astype(np.complex128)) / abs(period), shapes[: len(mass)]
-
-
-def _weights(count: int, sense: float) -> Floats:
-    """Weights (steps, count) of values at even angles for those at the middle of each step, by Fourier series."""
-    turns = np.fft.fftfreq(count, 1.0 / count)
-    angles = np.outer(sense * 2.0 * np.pi * (np.arange(STEPS) + 0.5) / STEPS, turns)
-    # Of an even number of angles the highest harmonic is a cosine.
-    phases = np.where(2 * turns == -count, np.cos(angles), np.exp(1j * angles))
-    return np.asarray((phases @ np.fft.fft(np.eye(count), axis=0)).real / count)

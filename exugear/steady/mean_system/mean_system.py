@@ -539,6 +539,7 @@ def _changes_over_places(
     most = ROWS_VARIATION if frame.assembly.has_rows or curved else VARIATION
     without = frame.without_varying
     still = stiffness[1] if without is frame else _stiffness(without, 0.0, speed, u)
+    size = np.sqrt(np.abs(np.diag(stiffness[1])).clip(min=1e-3 * np.abs(np.diag(stiffness[1])).max()))
     for place, psi in enumerate(places[1:].tolist(), start=1):
         masses[place] = _mass(frame, psi, u) - mass
         dampings[place] = _damping(frame, psi, speed, u) - damping
@@ -550,21 +551,15 @@ def _changes_over_places(
             for n in (0, 2):
                 stiffnesses[n, place] = _stiffness(frame, psi, float(speeds[n]), static[n]) - stiffness[n]
             stiffnesses[1, place] = 0.5 * (stiffnesses[0, place] + stiffnesses[2, place])
-        largest = max(largest, _checked_change(turned - still, stiffness[1], most))
+        change = float(np.abs((turned - still) / np.outer(size, size)).max())
+        if change > most:
+            raise SteadyError(
+                f"the stiffness varies by {100.0 * change:.2g} % over a carrier revolution (unequal planets, or a "
+                "support that rotates with them), which the steady-state response cannot treat; use exugear run instead"
+            )
+        largest = max(largest, change)
         report(place)
     return (masses, dampings, stiffnesses), largest
-
-
-def _checked_change(changes: Floats, stiffness: Floats, most: float) -> float:
-    """Find the change of stiffness with the carrier's angle, over it, and refuse more of it than a share."""
-    size = np.sqrt(np.abs(np.diag(stiffness)).clip(min=1e-3 * np.abs(np.diag(stiffness)).max()))
-    change = float(np.abs(changes / np.outer(size, size)).max())
-    if change > most:
-        raise SteadyError(
-            f"the stiffness varies by {100.0 * change:.2g} % over a carrier revolution (unequal planets, or a support "
-            "that rotates with them), which the steady-state response cannot treat; use exugear run instead"
-        )
-    return change
 
 
 def most_rolling(system: MeanSystem, shapes: Complexes) -> Integers:

@@ -12,6 +12,17 @@ from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.system.loads import LoadTable
 from exugear.transient.compiled.solver import CompiledSystem, Observer
 
+CYCLE = 2.0 * np.pi * np.arange(50) / 50
+SHAPE = 1.0 + 0.08 * np.cos(CYCLE) + 0.03 * np.sin(2 * CYCLE)
+"""Mesh stiffness over the mesh cycle, relative to its mean."""
+FOUR = {"bodies.planet.planet_angles_deg": [0.0, 90.0, 180.0, 270.0]}
+"""Four planets in place of the three of the GRC, each a quarter of a cycle ahead of the one before."""
+
+
+def line_at(model, order):
+    """Place of the line nearest to an order."""
+    return int(np.argmin(np.abs(model.lines.orders - order)))
+
 
 def solver_of(assembly, speeds, level, harmonics=10, combinations=3):
     model = harmonic_balance_model(assembly, np.array(speeds), harmonics, combinations)

@@ -19,9 +19,9 @@ from exugear.steady.steady_response import response_of
 from exugear.system.build import assemble
 from exugear.system.loads import LoadTable
 
-from ..cases.both_ways import compiled_states, exudyn_states
+from ..cases.both_ways import assert_both_solvers_move_alike
 from ..cases.spur import SPUR_CASE
-from ..cases.steady_runs import fitted, solver_of
+from ..cases.steady_runs import SHAPE, fitted, line_at, solver_of
 
 RIPPLE = {"body": "shaft_1", "orders": [3, 6], "pole_pairs": 2, "torque_N_m": [1.0, 5.0], "phase_deg": [0.0, 30.0]}
 SPEEDS = (50.0, 150.0)
@@ -32,9 +32,7 @@ def gearbox(**changes):
 
 
 def spur_assembly(variation=1.0, **changes):
-    cycle = 2.0 * np.pi * np.arange(50) / 50
-    waves = 0.08 * np.cos(cycle) + 0.03 * np.sin(2 * cycle)
-    return assemble(gearbox(**changes), Choice("bushing"), {"spur": 3e8 * (1.0 + variation * waves)})
+    return assemble(gearbox(**changes), Choice("bushing"), {"spur": 3e8 * (1.0 + variation * (SHAPE - 1.0))})
 
 
 def test_two_inertias_on_a_mesh_answer_as_in_closed_form():
@@ -56,8 +54,7 @@ def test_two_inertias_on_a_mesh_answer_as_in_closed_form():
         spring = stiffness * (1.0 + 1j * w * 1e-5)
         expected = 4.0 * r_1 / 1e-2 / (spring * (r_1**2 / 1e-2 + r_2**2 / 3e-2) - w**2)
         overall = 2.0 * signals(solver.model, solver.response(speed))[:, 0]
-        line = int(np.argmin(np.abs(solver.model.lines.orders - 7.0)))
-        assert abs(overall[line]) == pytest.approx(abs(expected), rel=1e-6)
+        assert abs(overall[line_at(solver.model, 7.0)]) == pytest.approx(abs(expected), rel=1e-6)
 
 
 @pytest.mark.parametrize("level", ["linear", "parametric"])
@@ -67,7 +64,7 @@ def test_a_ripple_started_on_its_steady_state_stays_there(level):
     solver = solver_of(assembly, SPEEDS, level)
     speed, lines = fitted(solver, solver.response(88.0), 0.8, 1.0 / 60e3, 0.4, assembly)
     known = 2.0 * signals(solver.model, solver.response(speed))[1:, 0]
-    line = int(np.argmin(np.abs(solver.model.lines.orders[1:] - 12.0)))
+    line = line_at(solver.model, 12.0) - 1
     assert abs(lines[line] - known[line]) < 5e-4 * abs(known[line])
     if level == "parametric":
         assert np.linalg.norm(lines - known) < 1e-3 * np.linalg.norm(known)
@@ -83,19 +80,14 @@ def test_both_solvers_have_the_same_torque_over_the_angle():
     applied = loads.generalized(assembly, 0.0, q, v)[assembly.spin["shaft_1"]]
     expected = 100.0 + np.cos(6 * 0.7) + 5.0 * np.cos(12 * 0.7 + np.pi / 6)
     assert applied == pytest.approx(expected, rel=1e-12)
-    load = {"shaft_1": 100.0, "shaft_2": 150.0}
-    ours, exudyns = (states(assembly, q, v, load, 60, 2e-6)[0] for states in (compiled_states, exudyn_states))
-    np.testing.assert_allclose(ours - q, exudyns - q, rtol=0.0, atol=1e-6 * np.abs(ours - q).max(axis=0).min())
-    without = assemble(gearbox(enabled=False), Choice("bushing"), {"spur": 3e8 * np.ones(50)})
-    assert np.abs(compiled_states(without, q, v, load, 60, 2e-6)[0] - ours).max() > 1e-9
+    assert_both_solvers_move_alike(assembly, q, v, spur_assembly(enabled=False))
 
 
 def test_contributions_name_the_torque_beside_the_meshes():
     """At the order of the ripple alone it makes all of the amplitude; at a mesh order nothing."""
     model = solver_of(spur_assembly(), SPEEDS, "parametric").model
     for order, shares in ((12.0, {"spur": 0.0, "ripple": 1.0}), (20.0, {"spur": 1.0})):
-        line = int(np.argmin(np.abs(model.lines.orders - order)))
-        assert contributions(model, 90.0, line).meshes == pytest.approx(shares, abs=1e-9)
+        assert contributions(model, 90.0, line_at(model, order)).meshes == pytest.approx(shares, abs=1e-9)
 
 
 def test_resonances_of_a_ripple_are_looked_for_even_where_the_mesh_does_not_vary():

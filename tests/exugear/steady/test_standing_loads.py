@@ -15,11 +15,9 @@ from exugear.steady.point_solver import ContactLossState, harmonic_balance_model
 from exugear.system.build import assemble
 
 from ..cases.bearing import BEARING_CASE, NON_LINEAR
-from .test_steady_in_time import solver_of
+from ..cases.steady_runs import FOUR, solver_of
 from .test_tooth_friction import curves_with_friction
 
-FOUR = {"bodies.planet.planet_angles_deg": [0.0, 90.0, 180.0, 270.0]}
-"""Out of phase, so that lateral forces do not cancel."""
 SPEED = 10.0
 AXES = "xyz"
 
