@@ -341,7 +341,7 @@ def compare_run_up(
     Parameters
     ----------
     response : as of `exugear.steady.steady_file.stored_or_computed`
-    limits : as of `exugear.steady.evaluation.damping.damping_extremes`
+    limits : as of `exugear.steady.evaluation.load_over_speed.damping_extremes`
 
     Raises
     ------

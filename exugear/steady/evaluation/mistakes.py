@@ -200,6 +200,7 @@ def level_findings(cuts: ComparedCuts) -> Iterator[Finding]:
             )
             continue
         offset = cuts.offset(number)
+        spread = float(np.median(np.abs(cuts.difference[number][compared] - offset)))
         if channel.quantity == "acceleration" and abs(abs(offset) - GRAVITY_LEVEL) < LEVEL_ERROR:
             written, meant = ("m/s2", "g") if offset > 0.0 else ("g", "m/s2")
             yield Finding(
@@ -215,7 +216,7 @@ def level_findings(cuts: ComparedCuts) -> Iterator[Finding]:
                 f"quantity, place and full scale of {key}",
                 offset,
             )
-        elif _differs_by_root_two(cuts, number):
+        elif abs(abs(offset) - ROOT_TWO_LEVEL) < ROOT_TWO_RANGE and spread < ROOT_TWO_RANGE:
             taken, meant = ("peak", "rms") if offset > 0.0 else ("rms", "peak")
             yield Finding(
                 "note",
@@ -224,14 +225,6 @@ def level_findings(cuts: ComparedCuts) -> Iterator[Finding]:
                 f"damping and stiffness may have the same effect: check the calibration of {key}",
                 offset,
             )
-
-
-def _differs_by_root_two(cuts: ComparedCuts, channel: int) -> bool:
-    """Return whether the levels of a channel differ by one factor near the square root of 2."""
-    difference = cuts.difference[channel][cuts.compared[channel]]
-    offset = cuts.offset(channel)
-    spread = float(np.median(np.abs(difference - offset)))
-    return abs(abs(offset) - ROOT_TWO_LEVEL) < ROOT_TWO_RANGE and spread < ROOT_TWO_RANGE
 
 
 def _slope(cuts: ComparedCuts, channel: int) -> float:

@@ -19,7 +19,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.units import RPM, STANDARD_GRAVITY
 from exugear.project import Project
-from exugear.steady.evaluation.fitted_response import response_levels
+from exugear.steady.evaluation.load_over_speed import response_levels
 from exugear.steady.evaluation.measured_comparison import MeasuredComparison, compare_run_up
 from exugear.steady.evaluation.mistakes import load_finding
 from exugear.steady.evaluation.run_up import MeasuredTorque, gearbox_at_torque, read_run_up, response_settings
