@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import math
+import tomllib
 
 import numpy as np
 
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
 from exugear.steady.balance.response import signals
 from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
+from exugear.system.build import assemble
 from exugear.system.loads import LoadTable
 from exugear.transient.compiled.solver import CompiledSystem, Observer
+
+from .spur import SPUR_CASE
+from .table import surface_of
 
 CYCLE = 2.0 * np.pi * np.arange(50) / 50
 SHAPE = 1.0 + 0.08 * np.cos(CYCLE) + 0.03 * np.sin(2 * CYCLE)
@@ -27,6 +34,19 @@ def line_at(model, order):
 def solver_of(assembly, speeds, level, harmonics=10, combinations=3):
     model = harmonic_balance_model(assembly, np.array(speeds), harmonics, combinations)
     return PointSolver(model, level)
+
+
+def loose_pair(torque=100.0, variation=3.0, **sections):
+    """Spur pair by a table whose teeth are 0.03 mm thinner and may part, and its solver by the method `nonlinear`."""
+    case = tomllib.loads(SPUR_CASE) | sections
+    case["static_load"]["torques_N_m"]["shaft_1"] = torque
+    case["damping"] = {"mesh_time_s": 4e-6, "bearing_time_s": 4e-6}
+    for gear in case["gears"].values():
+        gear["tooth_thinning_mm"] = 0.03
+    gearbox = Gearbox.from_dict(case)
+    surface = surface_of(gearbox, "spur", variation=variation, stiffness=3e8)
+    assembly = assemble(gearbox, Choice("bushing", "table"), {"spur": surface})
+    return assembly, solver_of(assembly, (50.0, 2000.0), "nonlinear")
 
 
 def torque_of_vibration(system: MeanSystem, speed: float, frequencies: np.ndarray, motion: np.ndarray) -> float:
@@ -130,14 +150,20 @@ def column_of(observer, name):
     return column
 
 
-def whole_run(model, response, duration, step, torque, assembly=None):
-    """Instants, all signals, and angle of the input of a run in time that starts on a response; its observer."""
+def start_of(model, response):
+    """Coordinates and velocities of a response at zero angle of the input."""
     interface = response.interface
     system, motion = model.system, response.motion + model.pin_places(interface.speed)
-    assembly = assembly or model.waves.assembly
     w = interface.frequencies[1:, None]
     u = system.static_at(interface.speed) + motion[0].real + 2.0 * motion[1:].sum(axis=0).real
-    q, v, _ = system.frame.state(0.0, interface.speed, u, 2.0 * (1j * w * motion[1:]).sum(axis=0).real)
+    return system.frame.state(0.0, interface.speed, u, 2.0 * (1j * w * motion[1:]).sum(axis=0).real)[:2]
+
+
+def whole_run(model, response, duration, step, torque, assembly=None):
+    """Instants, all signals, and angle of the input of a run in time that starts on a response; its observer."""
+    system = model.system
+    assembly = assembly or model.waves.assembly
+    q, v = start_of(model, response)
     load = assembly.gearbox.case.static_load
     loads = LoadTable({**load.torques_N_m, load.locked[0]: torque}, varying=assembly.varying_loads)
     run = CompiledSystem(assembly, q, v, loads, step)

@@ -20,9 +20,8 @@ from exugear.system.build import assemble
 from exugear.system.tooth_mesh.element import MeshCurve
 
 from ..cases import gear_trains
-from ..cases import table as table_case
 from ..cases.spur import SPUR_CASE
-from ..cases.steady_runs import SHAPE, apart, fitted, line_at, solver_of
+from ..cases.steady_runs import SHAPE, apart, fitted, line_at, loose_pair, solver_of
 
 RUN_OUT = {"body": "shaft_1", "runout_um": 20.0, "runout_angle_deg": 30.0}
 PITCH = [0.0, 1.5, 3.0, 2.0, -1.0, -2.5, -1.0, 0.5, 2.0, 1.0]
@@ -140,20 +139,6 @@ def test_deviations_on_curves_evaluated_in_time_stay_on_their_steady_state(devia
     assert apart(solver_of(assembly, SPEEDS, "nonlinear"), 60.0, 1.6, 1.0 / 60e3, 0.8, assembly)[0] < 1e-3
 
 
-def table_pair(torque, **deviations):
-    """Pair of a table whose teeth may part, with deviations, and its solver."""
-    case = tomllib.loads(SPUR_CASE)
-    case["static_load"]["torques_N_m"]["shaft_1"] = torque
-    case["damping"] = {"mesh_time_s": 4e-6, "bearing_time_s": 4e-6}
-    for gear in case["gears"].values():
-        gear["tooth_thinning_mm"] = 0.03
-    without = Gearbox.from_dict(case)
-    surface = table_case.surface_of(without, "spur", variation=3.0, stiffness=3e8)
-    gearbox = Gearbox.from_dict(case | {"deviations": deviations})
-    assembly = assemble(gearbox, Choice("bushing", "table"), {"spur": surface})
-    return assembly, solver_of(assembly, (50.0, 2000.0), "nonlinear")
-
-
 @pytest.mark.validation
 @pytest.mark.parametrize("torque", [20.0, -20.0])
 def test_teeth_that_part_once_in_a_revolution_have_the_amplitudes_of_a_run(torque):
@@ -161,7 +146,7 @@ def test_teeth_that_part_once_in_a_revolution_have_the_amplitudes_of_a_run(torqu
 
     Half of the speed at which the mesh frequency is that of the teeth; with reversed torque the other flank bears.
     """
-    assembly, solver = table_pair(torque, one={"body": "shaft_1", "runout_um": 20.0})
+    assembly, solver = loose_pair(torque, deviations={"one": {"body": "shaft_1", "runout_um": 20.0}})
     speed = 0.5 * float(solver.model.system.eigenvalues(100.0).imag.max()) / 20.0
     solver.response(speed)
     state = solver.state
@@ -174,7 +159,7 @@ def test_teeth_that_part_once_in_a_revolution_have_the_amplitudes_of_a_run(torqu
 
 def test_a_run_that_looks_for_a_state_has_the_deviations():
     """Started without vibration it settles to the eccentricity."""
-    _, solver = table_pair(100.0, one={"body": "shaft_1", "runout_um": 20.0})
+    _, solver = loose_pair(deviations={"one": {"body": "shaft_1", "runout_um": 20.0}})
     response = solver.response(70.0)
     model = solver.model
     rows = response.interface.ports.readings[:, DEFLECTION]

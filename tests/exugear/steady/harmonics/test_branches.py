@@ -7,7 +7,7 @@ import pytest
 import scipy.integrate
 import scipy.optimize
 
-from exugear.steady.harmonics.branches import Scales, exponents, kicks_needed, trace
+from exugear.steady.harmonics.branches import Scales, exponents, trace
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
 from exugear.steady.harmonics.lines import line_set, rank1_lattice
 
@@ -151,7 +151,3 @@ def test_a_start_that_leads_nowhere_is_told():
 
     with pytest.raises(HarmonicBalanceError, match="continuation: no solution at the start 1"):
         trace(residual, np.zeros(2, dtype=complex), 1.0, 2.0, Scales(1.0, 1.0), step=0.1, longest=0.1)
-
-
-def test_kicks_follow_the_fastest_mode():
-    assert kicks_needed(500.0, 0.1) == 300
