@@ -202,7 +202,14 @@ class ModeNamer:
         The kind is one of `KINDS`, `MIXED`, or empty where no planet set carries the mode; with the carrier where there
         are several. The name has the kinetic energy by body and the strain energy by element.
         """
-        kinetic = self._kinetic(shape)
+        # Kinetic energy of the real and imaginary part by body and motion, weighted by their energy.
+        parts = (shape.real, shape.imag)
+        energies = [float(part @ self.system.mass @ part) for part in parts]
+        kinetic = np.zeros((len(self.assembly.bodies), len(BODY_MOTIONS)))
+        for part, energy in zip(parts, energies, strict=True):
+            if energy > 0.0:
+                own = kinetic_shares(self.assembly, (self._turn @ part)[:, None], self._q)[0]
+                kinetic += energy / sum(energies) * own
         moved = self._turn @ shape
         strain = np.array([float((moved.conj() @ k @ moved).real) for k in self._elements.values()])
         share = strain / max(float(strain.sum()), 1e-300)
@@ -228,17 +235,6 @@ class ModeNamer:
         if total > LATERAL * whole:
             return float(circling / total)
         return 0.0
-
-    def _kinetic(self, shape: Complexes) -> Floats:
-        """Share of kinetic energy (bodies, motions) of the real and imaginary part, weighted by their energy."""
-        parts = (shape.real, shape.imag)
-        energies = [float(part @ self.system.mass @ part) for part in parts]
-        shares = np.zeros((len(self.assembly.bodies), len(BODY_MOTIONS)))
-        for part, energy in zip(parts, energies, strict=True):
-            if energy > 0.0:
-                moved = (self._turn @ part)[:, None]
-                shares += energy / sum(energies) * kinetic_shares(self.assembly, moved, self._q)[0]
-        return shares
 
     def _kind(self, shape: Complexes, kinetic: Floats) -> str:
         sets = [planets for planets in self.system.frame.sets if not planets.is_single]

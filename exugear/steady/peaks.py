@@ -16,7 +16,7 @@ from exugear.results.spectra.resonances import OrderCut, sweep_severity
 from exugear.results.spectra.waterfall import SAME_ORDER, OrderLine
 from exugear.steady.harmonics.branches import standing_peaks
 from exugear.steady.mean_system.planet_sets import SteadyError
-from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.arrays import Complexes, Floats, Integers
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -181,18 +181,13 @@ def planet_sidebands(
     """
     point, line = _place(data, peak)
     names = [str(name) for name in data["signal"].to_numpy()]
-
-    def coefficient(name: str) -> complex:
-        place = {"point": point, "line": line, "signal": names.index(name)}
-        selected = data[["amplitude", "phase"]].isel(place)
-        return complex(float(selected["amplitude"]) * np.exp(1j * float(selected["phase"])))
-
     found = []
     for family, (carrier, ratio) in carriers.items():
         waves = [f"mesh_force {family}{wave}" for wave in ("", " cosine", " sine")]
         if not set(waves) <= set(names):
             continue
-        mean, cosine, sine = (coefficient(name) for name in waves)
+        places = [names.index(name) for name in waves]
+        mean, cosine, sine = _amplitudes(data.isel(point=point, line=line), places)
         turning = ratio * peak.speed
         felt = {1: 0.5 * abs(cosine - 1j * sine), -1: 0.5 * abs(cosine + 1j * sine)}
         largest = max(abs(mean), *felt.values(), 1e-300)
@@ -204,6 +199,12 @@ def planet_sidebands(
                 name = f"mesh_force {family}, one planet"
                 found.append(Sideband(name, shifted, float(amplitude), float(amplitude / largest), cause))
     return tuple(sorted(found, key=lambda band: -band.share))
+
+
+def _amplitudes(data: xr.Dataset, signals: list[int]) -> Complexes:
+    """Complex amplitudes (..., signals) of some signals, of line 0 the mean."""
+    chosen = data[["amplitude", "phase"]].isel(signal=signals)
+    return np.asarray(chosen["amplitude"].to_numpy() * np.exp(1j * chosen["phase"].to_numpy().astype(np.float64)))
 
 
 def _place(data: xr.Dataset, peak: Peak) -> tuple[int, int]:
@@ -257,8 +258,7 @@ def tensile_fractions(data: xr.Dataset) -> dict[str, Floats]:
 
 def _pulling(data: xr.Dataset, places: list[int]) -> Floats:
     """Fraction of time at each speed with tensile mesh force, from its components: common one first, then others."""
-    selected = data[["amplitude", "phase"]].isel(signal=places)
-    force = selected["amplitude"].to_numpy() * np.exp(1j * selected["phase"].to_numpy().astype(np.float64))
+    force = _amplitudes(data, places)
     static = force[:, 0, 0].real
     force *= np.where(static < 0.0, -1.0, 1.0)[:, None, None]
     swing = np.abs(force).sum(axis=(1, 2)) - np.abs(static)
@@ -286,18 +286,14 @@ def dynamic_load_ratios(data: xr.Dataset) -> dict[str, Floats]:
     """Return dynamic over static load at each speed (n,) of the bearings that `bearing_swings` checks."""
     names = [str(name) for name in data["signal"].to_numpy()]
     ratios = {}
-    for bearing, static in json.loads(data.attrs["bearing_static_loads"]).items():
+    for bearing, load in json.loads(data.attrs["bearing_static_loads"]).items():
         signals = [f"support_force {bearing} {axis}" for axis in "xyz"]
         if set(signals) <= set(names):
-            ratios[bearing] = _swinging(data, [names.index(name) for name in signals], np.array(static))
+            static = np.array(load)
+            # The largest vibration is along the static load, over which it counts.
+            force = _amplitudes(data.isel(line=slice(1, None)), [names.index(name) for name in signals])
+            ratios[bearing] = np.nan_to_num(np.abs(force @ static).sum(axis=1)) / (static @ static)
     return ratios
-
-
-def _swinging(data: xr.Dataset, places: list[int], static: Floats) -> Floats:
-    """Largest vibration along a static load (3,) at each speed, over that load."""
-    selected = data[["amplitude", "phase"]].isel(signal=places, line=slice(1, None))
-    force = selected["amplitude"].to_numpy() * np.exp(1j * selected["phase"].to_numpy().astype(np.float64))
-    return np.asarray(np.nan_to_num(np.abs(force @ static).sum(axis=1)) / (static @ static))
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ moment -w F about the middle of the face.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -16,22 +17,18 @@ from exugear.steady.mean_system.mesh_waves import CycleQuantity, MeshWaves
 from fe_ste.tools.arrays import Complexes, Floats
 
 
+@dataclass(frozen=True, eq=False)
 class MeshCycles:
-    """Harmonics over the mesh cycle of what all m mesh components have.
+    """Harmonics over the mesh cycle of what all m mesh components have."""
 
-    Parameters
-    ----------
-    kinds : families of the components
-    harmonics : highest one of each mesh frequency
-    forces : number of forces, and of readings, of each component
-    shuttles : whether moments by misalignment are among them
-    """
-
-    def __init__(
-        self, waves: MeshWaves, kinds: tuple[Family, ...], harmonics: int, forces: int, shuttles: bool
-    ) -> None:
-        self.waves, self.families, self.harmonics = waves, kinds, harmonics
-        self.forces, self.shuttles = forces, shuttles
+    waves: MeshWaves
+    families: tuple[Family, ...]
+    harmonics: int
+    """Highest one of each mesh frequency."""
+    forces: int
+    """Number of forces, and of readings, of each component."""
+    shuttles: bool
+    """Whether moments by misalignment are among them."""
 
     def functions(self, spectra: Spectra) -> CycleFunctions:
         """Functions of the mesh cycles by their harmonics, as `HarmonicCoupling` takes them at a speed."""

@@ -124,10 +124,7 @@ def linear_response(model: HarmonicBalanceModel, interface: Interface) -> Respon
     excess = transmission_errors(model, interface.ports, interface.speed)
     excess[..., DEFLECTION] += mean_deviation_forces(model, interface.speed)
     forces = excess.reshape(len(excess), -1)
-    if excess.shape[2] == 1:
-        answer = -np.einsum("nij,nj->ni", interface.deflection[..., 0], forces)
-    else:
-        answer = -(interface.deflection_per_force @ forces[..., None]).reshape(excess.shape)[..., DEFLECTION]
+    answer = -np.einsum("nij,nj->ni", interface.deflection_per_force, forces).reshape(excess.shape)[..., DEFLECTION]
     for _ in range(BEARINGS_REPEATED if model.shaft_orders.bearings else 0):
         interface = with_unequal_bearings(model, interface, _motion(interface, forces))
     return _response(model, interface, interface.static[..., DEFLECTION] + answer, forces, 0)

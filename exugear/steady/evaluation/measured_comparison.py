@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -29,20 +29,7 @@ from exugear.steady.evaluation.comparison import (
     resolution_text,
     resonance_shift,
 )
-from exugear.steady.evaluation.mistakes import (
-    band_findings,
-    coverage_finding,
-    drift_finding,
-    foreign_finding,
-    jump_finding,
-    level_findings,
-    load_finding,
-    measured_foreign_orders,
-    recording_findings,
-    shift_finding,
-    spectrum_of,
-    speed_finding,
-)
+from exugear.steady.evaluation.mistakes import noticed_mistakes
 from exugear.steady.evaluation.run_up import MeasuredRunUp
 from exugear.steady.steady_file import settings_of
 from fe_ste.tools.arrays import SingleComplexes
@@ -353,26 +340,14 @@ def compare_run_up(
     cuts = compared_cuts(run_up, response, limits)
     stretch = best_stretch(cuts)
     peaks = paired_peaks(cuts, stretch)
-    spectrum = spectrum_of(run_up)
-    foreign = measured_foreign_orders(gearbox, spectrum)
-    found: Sequence[Iterator[Finding]] = (
-        speed_finding(gearbox, run_up, spectrum),
-        recording_findings(run_up),
-        load_finding(run_up, settings_of(response.attrs).method),
-        band_findings(cuts),
-        drift_finding(cuts),
-        level_findings(cuts),
-        foreign_finding(foreign, run_up),
-        coverage_finding(cuts),
-        shift_finding(resonance_shift(peaks, stretch)),
-        jump_finding(cuts, peaks),
-    )
+    shift = resonance_shift(peaks, stretch)
+    foreign, findings = noticed_mistakes(gearbox, cuts, peaks, shift, settings_of(response.attrs).method)
     return MeasuredComparison(
         cuts=cuts,
         stretch=stretch,
         peaks=peaks,
         foreign=foreign,
-        findings=tuple(finding for part in found for finding in part),
+        findings=findings,
         harmonics=int(response.attrs["harmonics"]),
         input_hash=comparison_hash(run_up.digest, run_up.section, str(response.attrs["input_hash"])),
     )

@@ -61,19 +61,37 @@ MOST_NAMED = 5
 """Maximum number of foreign orders that a sentence names."""
 
 
-def spectrum_of(run_up: MeasuredRunUp) -> OrderSpectrum | None:
-    """Order spectrum of the channel with the highest order: the one in which orders are clearest."""
-    found = [order_spectrum(values, run_up.shaft, run_up.per) for values in run_up.values]
-    known = [spectrum for spectrum in found if spectrum is not None]
-    return max(known, key=lambda spectrum: float(spectrum.prominence.max()), default=None)
+def noticed_mistakes(
+    gearbox: Gearbox, cuts: ComparedCuts, peaks: Sequence[PeakPair], shift: float, method: Method
+) -> tuple[tuple[OrderInSpectrum, ...], tuple[Finding, ...]]:
+    """Return orders that carry power and belong to no shaft, mesh or sideband of the gearbox, and all findings.
 
-
-def measured_foreign_orders(gearbox: Gearbox, spectrum: OrderSpectrum | None) -> tuple[OrderInSpectrum, ...]:
-    """Orders of a measurement that carry power and belong to no shaft, mesh or sideband of the gearbox."""
-    if spectrum is None:
-        return ()
-    known = gearbox_orders(gearbox, float(spectrum.order[-1]))
-    return foreign_orders(standing_orders(spectrum), known, spectrum.resolution)
+    Parameters
+    ----------
+    shift : computed over measured speed of resonances minus 1
+    method : of the response
+    """
+    run_up = cuts.run_up
+    spectra = [order_spectrum(values, run_up.shaft, run_up.per) for values in run_up.values]
+    known = [spectrum for spectrum in spectra if spectrum is not None]
+    # The channel with the highest order shows orders clearest.
+    spectrum = max(known, key=lambda own: float(own.prominence.max()), default=None)
+    foreign: tuple[OrderInSpectrum, ...] = ()
+    if spectrum is not None:
+        of_gearbox = gearbox_orders(gearbox, float(spectrum.order[-1]))
+        foreign = foreign_orders(standing_orders(spectrum), of_gearbox, spectrum.resolution)
+    return foreign, (
+        *speed_finding(gearbox, run_up, spectrum),
+        *recording_findings(run_up),
+        *load_finding(run_up, method),
+        *band_findings(cuts),
+        *drift_finding(cuts),
+        *level_findings(cuts),
+        *foreign_finding(foreign),
+        *coverage_finding(cuts),
+        *shift_finding(shift),
+        *jump_finding(cuts, peaks),
+    )
 
 
 def recording_findings(run_up: MeasuredRunUp) -> Iterator[Finding]:
@@ -276,7 +294,7 @@ def jump_finding(cuts: ComparedCuts, peaks: Sequence[PeakPair]) -> Iterator[Find
         )
 
 
-def foreign_finding(orders: Sequence[OrderInSpectrum], run_up: MeasuredRunUp) -> Iterator[Finding]:
+def foreign_finding(orders: Sequence[OrderInSpectrum]) -> Iterator[Finding]:
     """Yield the orders that belong to nothing of the gearbox."""
     if orders:
         shown = ", ".join(f"{own.order:.4g}" for own in orders[:MOST_NAMED])

@@ -410,14 +410,6 @@ def _has_sectors(gearbox: Gearbox, mesh: Mesh) -> bool:
     return seat is not None and seat.sectors is not None
 
 
-def _residual(frame: RotatingFrame, psi: float, speed: float, u: Floats) -> Floats:
-    """Generalized forces (size,) in the frame that inertia needs, less those that elements give."""
-    assembly = frame.assembly
-    q, v, a = frame.state(psi, speed, u)
-    missing = assembly.inertia_forces(q, v, a) - assembly.forces(q, v, frame.mean_meshes)
-    return np.asarray(frame.matrices(psi)[0].T @ missing)
-
-
 def tangents(frame: RotatingFrame, psi: float, speed: float, u: Floats) -> tuple[Floats, Floats]:
     """Damping and stiffness (size, size) in the frame, about the coordinates u at the input's angle psi.
 
@@ -452,7 +444,10 @@ def _mass(frame: RotatingFrame, psi: float, u: Floats) -> Floats:
 
 
 def _residuals(frame: RotatingFrame, psi: float, speed: float, u: Floats, du: Floats | None) -> Floats:
-    """Return `_residual` at several coordinates and velocities (n, size) at once: bearings have much in common."""
+    """Generalized forces (n, size) in the frame that inertia needs, less those that elements give.
+
+    At several coordinates and velocities (n, size) at once: bearings have much in common.
+    """
     assembly = frame.assembly
     t = frame.matrices(psi)[0]
     states = [frame.state(psi, speed, place, None if du is None else du[n]) for n, place in enumerate(u)]
@@ -491,7 +486,7 @@ def _static(
     best = before = np.inf
     bordered = np.zeros((n + 1, n + 1))
     for _ in range(MOST_STEPS):
-        held = np.mean([_residual(frame, float(psi), speed, u) for psi in places], axis=0)
+        held = np.mean([_residuals(frame, float(psi), speed, u[None], None)[0] for psi in places], axis=0)
         missing = held - load - torque * drive
         error = float(np.abs(np.append(missing, largest * u[pinned])).max()) / largest
         if not error < np.inf or (best < BALANCED and error > 0.5 * best):

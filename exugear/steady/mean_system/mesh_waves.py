@@ -418,13 +418,8 @@ def mesh_groups(frame: RotatingFrame) -> tuple[tuple[tuple[int, ...], PlanetSet 
     out = []
     for meshes, planets in found.values():
         if planets is not None:
-            by_planet = {
-                name: m
-                for m in meshes
-                for name in planets.names
-                if name in (frame.assembly.elements[m].mesh.pinion, frame.assembly.elements[m].mesh.gear)
-            }
-            meshes = tuple(by_planet[name] for name in planets.names)
+            ends = {m: (frame.assembly.elements[m].mesh.pinion, frame.assembly.elements[m].mesh.gear) for m in meshes}
+            meshes = tuple(next(m for m in meshes if name in ends[m]) for name in planets.names)
         out.append((meshes, planets))
     return tuple(out)
 

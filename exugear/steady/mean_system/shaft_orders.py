@@ -322,24 +322,19 @@ class _Series:
             self._add(self.reaction, (DEVIATION, key), self._no_reaction)
             self._add(self.shift, (DEVIATION, key), shift[turn])
             self._add(self.centrifugal, (DEVIATION, key), pushed[turn])
-        self._add_bearings(planets, most)
+        # What bearings that are not equal have beyond their mean in the static state.
+        if (unequal := unequal_bearings(self.assembly, self.waves.system, planets)) is not None:
+            self.bearings.append(unequal)
+            for turn, still in zip(unequal.turns.tolist(), unequal.still, strict=True):
+                if 0 <= turn <= most:
+                    bearing_forces = self._no_reaction
+                    bearing_forces[unequal.coordinates] = still
+                    self._add(self.reaction, (DEVIATION, self._turns(planets, turn)), bearing_forces)
         # The lateral vibration of central bodies passes the planets' differences: that adds a turn of the carrier.
         for turn in range(1, most + 2):
             key = self._turns(planets, turn)
             self.beside += [(key, None, None)] if turn <= most else []
             self.beside += [(key, base, reach) for base, reach in enumerate(self._reaches) if reach]
-
-    def _add_bearings(self, planets: PlanetSet, most: int) -> None:
-        """Add what bearings that are not equal have beyond their mean in the static state, up to a turn of the set."""
-        unequal = unequal_bearings(self.assembly, self.waves.system, planets)
-        if unequal is None:
-            return
-        self.bearings.append(unequal)
-        for turn, still in zip(unequal.turns.tolist(), unequal.still, strict=True):
-            if 0 <= turn <= most:
-                pushed = self._no_reaction
-                pushed[unequal.coordinates] = still
-                self._add(self.reaction, (DEVIATION, self._turns(planets, turn)), pushed)
 
     def _pin_motion(self, planets: PlanetSet, most: int) -> tuple[Complexes, Complexes]:
         """Places that unequal pins give to planets (t, size) in the rotating frame, by multiples of the carrier's turn.

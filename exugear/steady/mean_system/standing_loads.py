@@ -15,7 +15,7 @@ import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import node_position
-from exugear.steady.mean_system.mesh_waves import MeshWaves, mesh_groups
+from exugear.steady.mean_system.mesh_waves import MeshWaves
 from exugear.steady.mean_system.rotating_frame import RotatingFrame
 from exugear.system.kernels.coordinates import BODY_SIZE, TILT
 from exugear.system.kernels.meshes import TILT_LEVER
@@ -88,7 +88,7 @@ def gear_load_rows(waves: MeshWaves) -> tuple[Floats, Floats, Floats]:
     assembly = waves.assembly
     gears = standing_gears(waves.system.frame)
     along, turning, *sliding = np.zeros((2 + FRICTION_PARTS, len(waves.waves), BODY_SIZE * len(gears)))
-    groups = {meshes[0]: (meshes, planets) for meshes, planets in mesh_groups(waves.system.frame)}
+    groups = {meshes[0]: (meshes, planets) for meshes, planets in waves.groups}
     for number, wave in enumerate(waves.waves):
         meshes, planets = groups[wave.first]
         shapes = np.ones((1, 1)) if planets is None else planets.shapes(0.0)[0]

@@ -9,6 +9,7 @@ import numpy as np
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.steady.balance.nonlinear import HarmonicResidual
 from exugear.steady.balance.response import signals
 from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
@@ -47,6 +48,29 @@ def loose_pair(torque=100.0, variation=3.0, **sections):
     surface = surface_of(gearbox, "spur", variation=variation, stiffness=3e8)
     assembly = assemble(gearbox, Choice("bushing", "table"), {"spur": surface})
     return assembly, solver_of(assembly, (50.0, 2000.0), "nonlinear")
+
+
+def error_of_tangents(solver, speed, step, of_bearings=False):
+    """Difference of the tangents of a balance from those by differences of its forces, over their size.
+
+    The state is random lines of 10 nm about the static one, the step (m) others. Of bearings, whose tilts count as
+    lengths, or of meshes, where 10 nm are 10 nrad.
+    """
+    balance = HarmonicResidual(solver.model, solver.model.at(speed), solver.sampling)
+    random = np.random.default_rng(0)
+
+    def some(size):
+        values = random.normal(size=(2, *balance.static.shape))
+        lines = size * (values[0] + 1j * values[1]) / (solver.model.lengths if of_bearings else 1.0)
+        lines[0] = lines[0].real
+        return lines
+
+    state, change = balance.static + some(1e-8), some(step)
+    own = np.s_[:, balance.meshes if of_bearings else 0 :]
+    ahead, behind = (balance.forces(state + sign * change)[0][own] for sign in (1.0, -1.0))
+    found = balance.forces(state)[1](change)[own]
+    assert np.abs(found).max() > 0.0
+    return np.linalg.norm(0.5 * (ahead - behind) - found) / np.linalg.norm(found)
 
 
 def torque_of_vibration(system: MeanSystem, speed: float, frequencies: np.ndarray, motion: np.ndarray) -> float:

@@ -92,14 +92,6 @@ def test_forces_move_a_rotor_along_their_direction_at_their_order(direction):
     assert abs(found[2]) == pytest.approx(20.0 / abs(1e8 - w**2) if direction == "fixed" else 0.0, rel=1e-3, abs=1e-18)
 
 
-def test_a_rotating_force_that_grows_with_the_square_of_the_speed_is_an_unbalance():
-    """The same motion at one speed: the force of 50 g mm at 2500 rad/s is 312.5 N."""
-    force = {"body": "shaft_1", "z_mm": 40.0, "orders": [1], "force_N": [[312.5, 0.0, 0.0]], "direction": "rotating"}
-    as_force = motion_at(solver_of(rotor(force | {"phase_deg": [30.0]}), SPEEDS, "linear", 1), 2500.0)
-    as_unbalance = motion_at(solver_of(rotor(UNBALANCE | {"z_mm": 40.0}), SPEEDS, "linear", 1), 2500.0)
-    np.testing.assert_allclose(as_force, as_unbalance, rtol=1e-9)
-
-
 def residual_in_space(assembly: Assembly, speed: float) -> float:
     """Largest difference of inertia from forces at five instants, by the response to stated loads, over these loads.
 
