@@ -318,26 +318,23 @@ def _shaft_angle(
     gearbox: Gearbox, key: str, section: MeasurementSection, recording: Recording
 ) -> tuple[ShaftAngle, float]:
     """Angle of the shaft with the tacho or speed signal, and its speed over that of the input."""
-    if section.tacho is not None:
-        kind, channel, shaft = "tacho", section.tacho.channel, section.tacho.shaft
-    else:
-        assert section.speed is not None
-        kind, channel, shaft = "speed", section.speed.channel, section.speed.shaft
-    per = abs(gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0).get(shaft, 0.0))
+    source = section.tacho or section.speed
+    assert source is not None  # checked with the section
+    kind = "speed" if section.tacho is None else "tacho"
+    per = abs(gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0).get(source.shaft, 0.0))
     if not per > 0.0:
         raise gearbox.error(
-            f"{key}.{kind}.shaft = {shaft!r}: does not turn with the overall input {gearbox.case.overall.input!r}; "
-            "name a shaft whose speed is in a fixed ratio to it"
+            f"{key}.{kind}.shaft = {source.shaft!r}: does not turn with the overall input "
+            f"{gearbox.case.overall.input!r}; name a shaft whose speed is in a fixed ratio to it"
         )
-    recorded = recording.channel(channel)
+    recorded = recording.channel(source.channel)
     try:
-        if section.tacho is not None:
-            return angle_of_tacho(recorded.values, recording.rate, section.tacho.pulses_per_revolution), per
-        assert section.speed is not None
-        unit = _unit(gearbox, f"{key}.speed", section.speed.unit, recorded, "speed")
+        if isinstance(source, TachoSection):
+            return angle_of_tacho(recorded.values, recording.rate, source.pulses_per_revolution), per
+        unit = _unit(gearbox, f"{key}.speed", source.unit, recorded, "speed")
         return angle_of_speed(unit.factor * recorded.values, recording.rate), per
     except SpeedSignalError as error:
-        raise gearbox.error(f"{key}.{kind}.channel = {channel!r}: {error}") from None
+        raise gearbox.error(f"{key}.{kind}.channel = {source.channel!r}: {error}") from None
 
 
 def _error_by_encoders(
