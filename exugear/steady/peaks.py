@@ -1,4 +1,4 @@
-"""Peaks of a stored steady-state response: dominant orders by speed, their sidebands, and their height in a run-up.
+"""Peaks of a stored steady-state response: dominant orders by speed, their sidebands, and loads outside a linear range.
 
 Responses are given as `exugear.steady.steady_file.load_response` reads them.
 """
@@ -6,14 +6,12 @@ Responses are given as `exugear.steady.steady_file.load_response` reads them.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from exugear.results.spectra.resonances import OrderCut, sweep_severity
-from exugear.results.spectra.waterfall import SAME_ORDER, OrderLine
 from exugear.steady.harmonics.branches import standing_peaks
 from exugear.steady.mean_system.planet_sets import SteadyError
 from fe_ste.tools.arrays import Complexes, Floats, Integers
@@ -24,8 +22,6 @@ if TYPE_CHECKING:
 
 LEAST_SPEEDS = 3
 """Speeds without which nothing stands out."""
-SAME_SPEED = 0.02
-"""Share of the speed within which a peak belongs to the crossing of its line with a mode."""
 DRAWN, MANY_TURNS = 4096, 2e4
 """Number of angles of the input at which contact loss is checked, and the range from which they are drawn, rad."""
 HEARD = 1e-4
@@ -128,8 +124,10 @@ def _tops(values: Floats) -> Integers:
     return standing_peaks(values)
 
 
-def sidebands(data: xr.Dataset, peak: Peak, signal: str = "overall_dte", least: float = 0.01) -> tuple[Sideband, ...]:
-    """Return orders that differ from a peak's by integer multiples of the other mesh frequencies, largest first.
+def sidebands(data: xr.Dataset, peak: Peak, least: float = 0.01) -> tuple[Sideband, ...]:
+    """Return orders of the overall transmission error beside that of a peak, largest first.
+
+    They differ from it by integer multiples of the other mesh frequencies.
 
     Parameters
     ----------
@@ -140,7 +138,7 @@ def sidebands(data: xr.Dataset, peak: Peak, signal: str = "overall_dte", least: 
     index = data["index"].to_numpy()
     bases = tuple(str(name) for name in data["base"].to_numpy())
     names = [str(name) for name in data["signal"].to_numpy()]
-    values: Floats = data["amplitude"].to_numpy()[point, :, names.index(signal)].astype(np.float64)
+    values: Floats = data["amplitude"].to_numpy()[point, :, names.index("overall_dte")].astype(np.float64)
     # Passing planets are beside what a mesh excites, however many times they pass.
     of_meshes = np.array([base != data.attrs.get("varying_carrier") for base in bases])
     carrying = int(np.argmax(np.abs(index[centre]) * of_meshes))
@@ -253,23 +251,21 @@ def tensile_fractions(data: xr.Dataset) -> dict[str, Floats]:
     for place, name in enumerate(map(str, data["signal"].to_numpy())):
         if name.startswith("mesh_force "):
             places.setdefault(name.split(" ")[1], []).append(place)
-    return {mesh: _pulling(data, signals) for mesh, signals in places.items()}
-
-
-def _pulling(data: xr.Dataset, places: list[int]) -> Floats:
-    """Fraction of time at each speed with tensile mesh force, from its components: common one first, then others."""
-    force = _amplitudes(data, places)
-    static = force[:, 0, 0].real
-    force *= np.where(static < 0.0, -1.0, 1.0)[:, None, None]
-    swing = np.abs(force).sum(axis=(1, 2)) - np.abs(static)
     angles = np.random.default_rng(0).uniform(0.0, MANY_TURNS, DRAWN)
-    shares = np.zeros(len(static))
-    for point in np.flatnonzero(swing >= np.abs(static)):
-        lines = np.flatnonzero(np.abs(force[point]).max(axis=1) > HEARD * np.abs(static[point]))
-        turning = np.exp(1j * np.outer(angles, data["order"].to_numpy()[lines]))
-        waves = (turning @ force[point, lines]).real
-        shares[point] = np.mean(waves[:, 0] < np.hypot.reduce(waves[:, 1:], axis=1, initial=0.0))
-    return shares
+    found = {}
+    for mesh, components in places.items():
+        # The component that all planets have in common comes first.
+        force = _amplitudes(data, components)
+        static = force[:, 0, 0].real
+        force *= np.where(static < 0.0, -1.0, 1.0)[:, None, None]
+        swing = np.abs(force).sum(axis=(1, 2)) - np.abs(static)
+        found[mesh] = np.zeros(len(static))
+        for point in np.flatnonzero(swing >= np.abs(static)):
+            lines = np.flatnonzero(np.abs(force[point]).max(axis=1) > HEARD * np.abs(static[point]))
+            turning = np.exp(1j * np.outer(angles, data["order"].to_numpy()[lines]))
+            waves = (turning @ force[point, lines]).real
+            found[mesh][point] = np.mean(waves[:, 0] < np.hypot.reduce(waves[:, 1:], axis=1, initial=0.0))
+    return found
 
 
 def bearing_swings(data: xr.Dataset) -> tuple[Excess, ...]:
@@ -294,64 +290,3 @@ def dynamic_load_ratios(data: xr.Dataset) -> dict[str, Floats]:
             force = _amplitudes(data.isel(line=slice(1, None)), [names.index(name) for name in signals])
             ratios[bearing] = np.nan_to_num(np.abs(force @ static).sum(axis=1)) / (static @ static)
     return ratios
-
-
-@dataclass(frozen=True)
-class ComparedPeak:
-    """A peak of a steady-state response and its amplitude in a run-up."""
-
-    peak: Peak
-    damping: float | None
-    """Share of critical damping of the mode that is met there, where one is known."""
-    run_amplitude: float
-    """Largest of the run-up near that speed, in the signal's unit."""
-    severity: float | None
-    """Of the sweep, as `exugear.results.spectra.resonances.sweep_severity` has it."""
-    run_rank: int
-    """Rank among the peaks by the run-up's amplitude, 1 for the highest."""
-
-
-def damping_at(data: xr.Dataset, peak: Peak) -> float | None:
-    """Damping of the mode that the line of a peak crosses there, None where none is known."""
-    orders = data["order"].to_numpy()
-    near = []
-    for crossing in json.loads(data.attrs["crossings"]):
-        same = abs(orders[crossing["line"]] - peak.order) < SAME_ORDER * peak.order
-        apart = abs(crossing["speed"] - peak.speed)
-        if same and apart < SAME_SPEED * abs(peak.speed):
-            near.append((apart, float(crossing["damping"])))
-    if near:
-        return min(near)[1]
-    return None
-
-
-def compared_peaks(
-    data: xr.Dataset, cut: Callable[[OrderLine], OrderCut], rate: float, most: int = 20, signal: str = "overall_dte"
-) -> tuple[ComparedPeak, ...]:
-    """Return the highest peaks of single mesh frequencies with their amplitudes in a run-up, highest first.
-
-    Parameters
-    ----------
-    data : steady-state response of the same variant
-    cut : from an order to its cut out of the run-up, as `exugear.results.spectra.resonances.run_up_cut` makes it
-    rate : at which order one sweeps, Hz/s
-    most : maximum number of peaks
-    """
-    index = data["index"].to_numpy()
-    orders = data["order"].to_numpy()
-    alone = orders[np.count_nonzero(index, axis=1) == 1]
-    found = [peak for peak in peaks(data, signal) if np.abs(alone - peak.order).min() < SAME_ORDER * peak.order][:most]
-    cuts = {peak.order: cut(OrderLine(peak.line, peak.order)) for peak in found}
-    heard = []
-    for peak in found:
-        own = cuts[peak.order]
-        # A run-up that does not pass the speed of a peak has no amplitude there.
-        passed = np.abs(np.abs(own.speed) / abs(peak.speed) - 1.0) <= SWEEP_SHIFT
-        heard.append(float(np.abs(own.amplitude[passed]).max(initial=0.0)))
-    louder = np.argsort(np.argsort([-amplitude for amplitude in heard], kind="stable"), kind="stable")
-    out = []
-    for peak, amplitude, place in zip(found, heard, louder, strict=True):
-        damping = damping_at(data, peak)
-        severity = None if damping is None else sweep_severity(peak.frequency, damping, rate * peak.order)
-        out.append(ComparedPeak(peak, damping, amplitude, severity, int(place) + 1))
-    return tuple(out)

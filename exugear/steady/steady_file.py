@@ -122,9 +122,6 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
         name: (over, *values[name]) for name, over in _OVER.items()
     }
     variables |= response.band.variables()
-    if response.bearing_names:
-        words = "fraction of time in which a bearing is unloaded (no rolling element in contact)"
-        variables["unloaded_fraction"] = (("point", "bearing"), solved.free, {"units": "1", "long_name": words})
     variables |= response.campbell.variables()
     coordinates: dict[str, Any] = {
         "mesh_wave": np.array(response.wave_names, dtype=object),
@@ -133,6 +130,8 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
         "quantity": np.array(response.band.quantities, dtype=object),
     }
     if response.bearing_names:
+        words = "fraction of time in which a bearing is unloaded (no rolling element in contact)"
+        variables["unloaded_fraction"] = (("point", "bearing"), solved.free, {"units": "1", "long_name": words})
         coordinates["bearing"] = np.array(response.bearing_names, dtype=object)
     if response.radiated is not None:
         velocity = np.abs(amplitude[..., response.signals.index(SURFACE_VELOCITY)]).astype(np.float64)

@@ -35,7 +35,7 @@ class MeshCycles:
         return CycleFunctions(self.waves, self.families, spectra, self.forces)
 
     def _harmonics_of(self, *quantities: CycleQuantity) -> Complexes:
-        """Fourier coefficients (m, harmonics + 1) of a product of quantities."""
+        """Fourier coefficients (m, harmonics + 1) of a product of quantities over the mesh cycle."""
         return self.waves.cycle_coefficients(*quantities, harmonics=self.harmonics)
 
     @cached_property

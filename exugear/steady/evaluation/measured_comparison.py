@@ -216,7 +216,17 @@ class MeasuredComparison(ReprMixin):
         headings = ("order", "amplitude", "above_neighbours_dB")
         others = write_table(path.with_name(f"{path.stem}-foreign.csv"), headings, foreign)
         picture = path.with_suffix(".png")
-        self._draw(picture)
+        count = len(self.cuts.run_up.channels)
+        with drawing_style():
+            figure = new_figure(COLUMN_WIDTHS[2], 1.0 + 2.6 * count)
+            panels = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
+            for channel, panel in enumerate(panels):
+                _draw_channel(panel, self.cuts, channel)
+                panel.legend(ncols=2, fontsize=6.5)
+            panels[-1].set_xlabel("Input speed / rpm")
+            words = f"{resolution_text(self.cuts.run_up)}; amplitudes zero-to-peak"
+            figure.supxlabel(words, fontsize=7.0, color="#555555")
+            finish_figure(figure, picture)
         return path, cuts, table, others, picture
 
     def _cut_rows(self) -> Iterator[list[float | str]]:
@@ -274,21 +284,6 @@ class MeasuredComparison(ReprMixin):
             "foreign_orders": json.dumps(summary["foreign_orders"]),
         }
         return xr.Dataset(variables, {key: np.array(own, dtype=object) for key, own in names.items()}, attributes)
-
-    def _draw(self, path: Path) -> None:
-        """Draw all channels below each other."""
-        count = len(self.cuts.run_up.channels)
-        with drawing_style():
-            figure = new_figure(COLUMN_WIDTHS[2], 1.0 + 2.6 * count)
-            panels = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
-            for channel, panel in enumerate(panels):
-                _draw_channel(panel, self.cuts, channel)
-                panel.legend(ncols=2, fontsize=6.5)
-            panels[-1].set_xlabel("Input speed / rpm")
-            figure.supxlabel(
-                f"{resolution_text(self.cuts.run_up)}; amplitudes zero-to-peak", fontsize=7.0, color="#555555"
-            )
-            finish_figure(figure, path)
 
 
 CUT_HEADINGS = (

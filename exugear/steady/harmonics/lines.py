@@ -240,9 +240,8 @@ def modulated(lines: LineSet, modulators: Sequence[Modulator], most: int = 0) ->
     orders = np.array([modulator.order for modulator in modulators])
     bases = np.append(lines.bases, orders)
     rows = {(*line.tolist(), *turns) for line in lines.index for turns in _all_turns(line, modulators, most)}
-    return _lines_of_rows(
-        np.array(sorted(rows)), bases, scipy.linalg.block_diag(lines.units, np.eye(len(modulators), dtype=np.int64))
-    )
+    units = scipy.linalg.block_diag(lines.units, np.eye(len(modulators), dtype=np.int64))
+    return _lines_of_rows(np.array(sorted(rows)), bases, units)
 
 
 def _all_turns(line: Integers, modulators: Sequence[Modulator], most: int) -> list[tuple[int, ...]]:

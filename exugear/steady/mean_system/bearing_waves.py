@@ -25,7 +25,7 @@ from exugear.system.bearings.stiffness import bearing_rows
 from exugear.system.kernels.connectors import rolling_pushes, rolling_strains
 from exugear.system.kernels.rolling import RollingArrays, selected_rolling
 from exugear.system.system import Assembly
-from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.arrays import Floats
 
 COMPONENTS = 5
 """Readings and forces of a bearing: along x, y, z, and tilts about x and y; of planets' along radius and tangent."""
@@ -113,7 +113,7 @@ class BearingWaves:
     def at(self, speed: float) -> BearingMean:
         """Find the static state of the bearings in the averaged system at a speed of the input, rad/s."""
         frame = self.system.frame
-        numbers = self._numbers
+        numbers = np.concatenate([self.waves[n].connectors for n in self.firsts]).astype(np.int64)  # law by law
         q, v, _ = frame.state(0.0, speed, self.system.static_at(speed))
         t, t1, _ = frame.matrices(0.0)
         chosen = self.assembly.connectors.chosen(numbers)
@@ -147,11 +147,6 @@ class BearingWaves:
             load=self._waves_of(np.concatenate(loads)),
             slope=self._mean_slope(self._waves_of(static)),
         )
-
-    @cached_property
-    def _numbers(self) -> Integers:
-        """All bearings (c,), law by law."""
-        return np.concatenate([self.waves[n].connectors for n in self.firsts]).astype(np.int64)
 
     def _waves_of(self, values: Floats) -> Floats:
         """Waves (b, ...) of values (c, ...) at zero angle of the input."""

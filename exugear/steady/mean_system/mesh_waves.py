@@ -367,8 +367,8 @@ class MeshWaves:
         return out
 
 
-def mesh_waves(system: MeanSystem, passing: int = 0, neighbours: int = NEIGHBOURS) -> MeshWaves:
-    """Mesh components of an averaged system; `passing` and, of a flexible ring gear, `neighbours` as in `MeshWaves`."""
+def mesh_waves(system: MeanSystem, passing: int = 0) -> MeshWaves:
+    """Mesh components of an averaged system; `passing` as in `MeshWaves`."""
     frame = system.frame
     assembly = frame.assembly
     gearbox = assembly.gearbox
@@ -402,7 +402,7 @@ def mesh_waves(system: MeanSystem, passing: int = 0, neighbours: int = NEIGHBOUR
             label = f"{name} {wave_name(number, planets.waves)}" if number else name
             waves.append(MeshWave(label, mesh.family, *own, number, float(weight), base, sense, planets.ratio, ahead))
     found = MeshWaves(system, tuple(waves), np.array(orders), tuple(", ".join(name) for name in names), passing)
-    return replace(found, neighbours=neighbours) if found.varying_carrier else found
+    return replace(found, neighbours=NEIGHBOURS) if found.varying_carrier else found
 
 
 def mesh_groups(frame: RotatingFrame) -> tuple[tuple[tuple[int, ...], PlanetSet | None], ...]:

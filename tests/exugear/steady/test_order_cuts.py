@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,11 +12,15 @@ import xarray as xr
 from exugear.gearbox.choice import Choice
 from exugear.results.spectra.resonances import OrderCut, sweep_severity
 from exugear.results.spectra.waterfall import OrderLine
-from exugear.steady.peaks import compared_peaks, damping_at, peaks
+from exugear.steady.peaks import peaks
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import to_dataset
 from exugear.steady.steady_response import response_of
 from exugear.system.build import assemble
+
+from ..cases.command import script
+
+ranking = script(Path(__file__).parents[3] / "cases" / "grc750", "ranking")
 
 
 def steady_cut(data: xr.Dataset, line: OrderLine) -> OrderCut:
@@ -34,7 +39,7 @@ def data(grc, stiffness):
 
 def test_a_run_that_shows_one_order_too_low_ranks_its_peaks_lower(data):
     """A run as slow as can be shows the steady response; one that loses an order to a tenth ranks that behind."""
-    slow = compared_peaks(data, lambda line: steady_cut(data, line), 1e-6, most=5)
+    slow = ranking.compared_peaks(data, lambda line: steady_cut(data, line), 1e-6, most=5)
     assert [own.run_rank for own in slow] == [1, 2, 3, 4, 5]
     for own in slow:
         # A louder peak of the same order may stand within the sweep's shift.
@@ -45,14 +50,14 @@ def test_a_run_that_shows_one_order_too_low_ranks_its_peaks_lower(data):
         cut = steady_cut(data, line)
         return replace(cut, amplitude=0.1 * cut.amplitude) if line.order == loudest else cut
 
-    assert compared_peaks(data, lossy, 1e-6, most=5)[0].run_rank > 1
+    assert ranking.compared_peaks(data, lossy, 1e-6, most=5)[0].run_rank > 1
 
 
 def test_the_severity_is_that_of_the_damping_at_the_peak(data):
-    own = next(own for own in compared_peaks(data, lambda line: steady_cut(data, line), 0.1) if own.damping)
-    assert own.damping == damping_at(data, own.peak)
+    own = next(own for own in ranking.compared_peaks(data, lambda line: steady_cut(data, line), 0.1) if own.damping)
+    assert own.damping == ranking.damping_at(data, own.peak)
     assert own.severity == sweep_severity(own.peak.frequency, own.damping, 0.1 * own.peak.order)
 
 
 def test_far_from_all_crossings_no_damping_is_known(data):
-    assert damping_at(data, replace(peaks(data)[0], speed=100.0)) is None
+    assert ranking.damping_at(data, replace(peaks(data)[0], speed=100.0)) is None
