@@ -184,15 +184,12 @@ class Modulator:
         """
         if self.passing:
             return self.least_turns(line)
-        multiple = int(line[list(self.of)].sum())
         if not np.any(line[list(self.of)]):
             return (0,)
         if self.step is None or np.count_nonzero(line) == 1:
             return tuple(range(-(self.count // 2), self.count // 2 + 1))
-        turns = (multiple * self.step) % self.count
-        if 2 * turns == self.count:
-            return (0,)
-        return (turns - self.count if 2 * turns > self.count else turns,)
+        least = self.least_turns(line)
+        return least if len(least) == 1 else (0,)
 
 
 def line_set(orders: Sequence[float], harmonics: int, combinations: int = 0) -> LineSet:

@@ -261,6 +261,7 @@ def test_speeds_at_which_loads_do_not_settle_are_told():
     assembly, _ = pair({"orders": [1], "torque_N_m": [0.1]})
     data = to_dataset(response_of(assembly, SteadySettings(speeds, "nonlinear", at_resonances=False)))
     assert not data["loads_at_mean_angles"].any()
+    assert data["energy_error"].max() < 1e-6
     assert not any("mean speed" in own.text for own in response_findings(data))
 
 
