@@ -340,10 +340,11 @@ class Campbell(ReprMixin, line=": {names!n} modes at {speeds!n} speeds"):
 
     def variables(self) -> dict[str, tuple[tuple[str, ...], Any, dict[str, str]]]:
         """Arrays with dimensions and units, as files hold them."""
-        return {
-            name: (over, np.array(own, dtype=object) if isinstance(own := getattr(self, field), tuple) else own, more)
-            for name, (field, over, more) in _VARIABLES.items()
-        }
+        found = {}
+        for name, (field, over, attributes) in _VARIABLES.items():
+            own = getattr(self, field)
+            found[name] = over, np.array(own, dtype=object) if isinstance(own, tuple) else own, attributes
+        return found
 
 
 def modes_over_speed(system: MeanSystem, low: float, high: float, highest: float) -> ModeTracks:

@@ -128,7 +128,6 @@ def crossings(
     counted[inside] = _shares(peaks[inside])
     strongest = [n for n in np.argsort(-counted, kind="stable") if counted[n] >= LEAST_SHARE][:MOST]
     strongest.sort(key=lambda n: -shares[n])
-
     system = model.system
 
     def exact(n: int) -> Crossing:
@@ -140,14 +139,14 @@ def crossings(
         order = float(model.lines.orders[lines[at]])
         start = followed.near(mode, speed)
         found = Mode(complex(start.value.real, order * abs(speed)), start.shape, start.left)
-        exactly = speed
+        crossed = speed
         for _ in range(ROUNDS):
-            found = improved(found, system.mass, system.damping_at(exactly), system.stiffness_at(exactly))
-            exactly = float(np.copysign(found.value.imag / order, exactly))
-        if start.assurance(found, system.mass, system.damping_at(exactly)) < SAME:
-            found, exactly = start, speed
+            found = improved(found, system.mass, system.damping_at(crossed), system.stiffness_at(crossed))
+            crossed = float(np.copysign(found.value.imag / order, crossed))
+        if start.assurance(found, system.mass, system.damping_at(crossed)) < SAME:
+            found, crossed = start, speed
         damping = float(-found.value.real / abs(found.value))
-        return Crossing(exactly, lines[at], mode, found.value.imag / 2.0 / np.pi, damping, float(shares[n]))
+        return Crossing(crossed, lines[at], mode, found.value.imag / 2.0 / np.pi, damping, float(shares[n]))
 
     low = tracks.speeds[0]
     high = tracks.speeds[-1]
@@ -155,7 +154,7 @@ def crossings(
 
 
 def in_operation(speeds: Floats, operation: tuple[float, float] | None) -> Booleans:
-    """Return which speeds (n,) are in a range of operation, rad/s without sign; all of them if none is."""
+    """Return which speeds (n,) are in an operating range, rad/s without sign; all without a range or a speed in it."""
     if operation is not None:
         inside = (np.abs(speeds) >= operation[0]) & (np.abs(speeds) <= operation[1])
         if inside.any():
@@ -345,7 +344,7 @@ def improved(mode: Mode, mass: Floats, damping: Floats, stiffness: Floats) -> Mo
     """Improve a mode by inverse iteration of its shapes and the Rayleigh quotient of both."""
     slope = 2.0 * mode.value * mass + damping
     matrix = mode.value**2 * mass + mode.value * damping + stiffness
-    # With few degrees of freedom the eigenvalue may be exact to the last bit, and the matrix exactly singular. A pivot
+    # With few degrees of freedom the eigenvalue may be exact to the last bit, and the matrix crossed singular. A pivot
     # of round-off in place of zero then gives the shape to full accuracy (Wilkinson 1965, as in LAPACK's xHSEIN).
     factor, pivots, _ = scipy.linalg.lapack.zgetrf(matrix)
     diagonal = np.einsum("ii->i", factor)
