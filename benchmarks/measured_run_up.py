@@ -17,8 +17,7 @@ import h5py
 import numpy as np
 
 from exugear import Choice, Project, template
-from exugear.steady.evaluation.damping import damping_extremes
-from exugear.steady.evaluation.load_over_speed import LoadedModels
+from exugear.steady.evaluation.load_over_speed import LoadedModels, damping_extremes
 from exugear.steady.evaluation.measured_comparison import compare_run_up
 from exugear.steady.evaluation.run_up import read_run_up, response_settings
 from exugear.steady.steady_file import steady_response

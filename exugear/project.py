@@ -358,8 +358,7 @@ class Project(ReprMixin):
         SteadyError
             The response has no signal at the place of a channel.
         """
-        from exugear.steady.evaluation.damping import damping_extremes
-        from exugear.steady.evaluation.load_over_speed import LoadedModels
+        from exugear.steady.evaluation.load_over_speed import LoadedModels, damping_extremes
         from exugear.steady.evaluation.measured_comparison import compare_run_up
         from exugear.steady.evaluation.run_up import MeasuredRunUp, read_run_up, response_settings
         from exugear.steady.steady_file import stored_or_computed
@@ -440,8 +439,8 @@ class Project(ReprMixin):
         FitError
             Too few orders of channels count.
         """
-        from exugear.steady.evaluation.fit import fit_levels
-        from exugear.steady.evaluation.fitted_response import response_levels, start_of_fit
+        from exugear.steady.evaluation.fit import fit_levels, start_of_fit
+        from exugear.steady.evaluation.load_over_speed import response_levels
         from exugear.steady.evaluation.run_up import response_settings
 
         cuts = comparison.cuts

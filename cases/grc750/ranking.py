@@ -8,15 +8,84 @@ the run-up ranks it too low. Tables, run-ups and steady responses that are there
 
 from __future__ import annotations
 
+import json
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
 
+import numpy as np
+import xarray as xr
 from one_variant import grc_project, show
 
 from exugear import Choice, load_run
 from exugear.gearbox.units import RPM
-from exugear.results.spectra.resonances import OrderCut, run_up_cut, sweep_rate
-from exugear.results.spectra.waterfall import OrderLine
-from exugear.steady.peaks import ComparedPeak, compared_peaks
+from exugear.results.spectra.resonances import OrderCut, run_up_cut, sweep_rate, sweep_severity
+from exugear.results.spectra.waterfall import SAME_ORDER, OrderLine
+from exugear.steady.peaks import SWEEP_SHIFT, Peak, peaks
+
+SAME_SPEED = 0.02
+"""Share of the speed within which a peak belongs to the crossing of its line with a mode."""
+
+
+@dataclass(frozen=True)
+class ComparedPeak:
+    """A peak of a steady-state response and its amplitude in a run-up."""
+
+    peak: Peak
+    damping: float | None
+    """Share of critical damping of the mode that is met there, where one is known."""
+    run_amplitude: float
+    """Largest of the run-up near that speed, in the signal's unit."""
+    severity: float | None
+    """Of the sweep, as `exugear.results.spectra.resonances.sweep_severity` has it."""
+    run_rank: int
+    """Rank among the peaks by the run-up's amplitude, 1 for the highest."""
+
+
+def damping_at(data: xr.Dataset, peak: Peak) -> float | None:
+    """Damping of the mode that the line of a peak crosses there, None where none is known."""
+    orders = data["order"].to_numpy()
+    near = []
+    for crossing in json.loads(data.attrs["crossings"]):
+        same = abs(orders[crossing["line"]] - peak.order) < SAME_ORDER * peak.order
+        apart = abs(crossing["speed"] - peak.speed)
+        if same and apart < SAME_SPEED * abs(peak.speed):
+            near.append((apart, float(crossing["damping"])))
+    if near:
+        return min(near)[1]
+    return None
+
+
+def compared_peaks(
+    data: xr.Dataset, cut: Callable[[OrderLine], OrderCut], rate: float, most: int = 20
+) -> tuple[ComparedPeak, ...]:
+    """Return the highest peaks of single mesh frequencies with their amplitudes in a run-up, highest first.
+
+    Parameters
+    ----------
+    data : steady-state response of the same variant
+    cut : from an order to its cut out of the run-up, as `exugear.results.spectra.resonances.run_up_cut` makes it
+    rate : at which order one sweeps, Hz/s
+    most : maximum number of peaks
+    """
+    index = data["index"].to_numpy()
+    orders = data["order"].to_numpy()
+    alone = orders[np.count_nonzero(index, axis=1) == 1]
+    found = [peak for peak in peaks(data) if np.abs(alone - peak.order).min() < SAME_ORDER * peak.order][:most]
+    cuts = {peak.order: cut(OrderLine(peak.line, peak.order)) for peak in found}
+    heard = []
+    for peak in found:
+        own = cuts[peak.order]
+        # A run-up that does not pass the speed of a peak has no amplitude there.
+        passed = np.abs(np.abs(own.speed) / abs(peak.speed) - 1.0) <= SWEEP_SHIFT
+        heard.append(float(np.abs(own.amplitude[passed]).max(initial=0.0)))
+    louder = np.argsort(np.argsort([-amplitude for amplitude in heard], kind="stable"), kind="stable")
+    out = []
+    for peak, amplitude, place in zip(found, heard, louder, strict=True):
+        damping = damping_at(data, peak)
+        severity = None if damping is None else sweep_severity(peak.frequency, damping, rate * peak.order)
+        out.append(ComparedPeak(peak, damping, amplitude, severity, int(place) + 1))
+    return tuple(out)
 
 
 def compared(variant: str) -> tuple[ComparedPeak, ...]:

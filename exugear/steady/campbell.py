@@ -181,19 +181,6 @@ TURNING = tuple(BODY_MOTIONS.index(name) for name in ("spin", "axial", "twist", 
 """Motions of a central body in rotational modes; all others are those of translational ones."""
 
 
-@dataclass(frozen=True)
-class NamedMode:
-    """Description of a mode as text."""
-
-    kind: str
-    """Of `KINDS`, `MIXED`, or empty where no planet set carries the mode; with the carrier where there are several."""
-    name: str
-    """Kinetic energy by body and strain energy by element."""
-    whirl: float
-    """1 for a circular orbit in the sense of rotation of the body, -1 against it, 0 for a straight orbit and where
-    radial motion of rotating bodies is negligible."""
-
-
 class ModeNamer:
     """Names the modes of the averaged system; its elements are linearised once, about the static state at one speed.
 
@@ -209,13 +196,31 @@ class ModeNamer:
         self._elements = linearise(self.assembly, self._q, frame.mean_meshes).stiffness
         self._senses = {name: float(np.sign(ratio * speed)) for name, ratio in frame.speeds.items()}
 
-    def named(self, shape: Complexes) -> NamedMode:
-        """Name a shape (size,) of the averaged system."""
-        kinetic = self._kinetic(shape)
-        return NamedMode(self._kind(shape, kinetic), self._words(shape, kinetic), self.whirl(shape))
+    def named(self, shape: Complexes) -> tuple[str, str]:
+        """Return kind and name of a shape (size,) of the averaged system.
+
+        The kind is one of `KINDS`, `MIXED`, or empty where no planet set carries the mode; with the carrier where there
+        are several. The name has the kinetic energy by body and the strain energy by element.
+        """
+        # Kinetic energy of the real and imaginary part by body and motion, weighted by their energy.
+        parts = (shape.real, shape.imag)
+        energies = [float(part @ self.system.mass @ part) for part in parts]
+        kinetic = np.zeros((len(self.assembly.bodies), len(BODY_MOTIONS)))
+        for part, energy in zip(parts, energies, strict=True):
+            if energy > 0.0:
+                own = kinetic_shares(self.assembly, (self._turn @ part)[:, None], self._q)[0]
+                kinetic += energy / sum(energies) * own
+        moved = self._turn @ shape
+        strain = np.array([float((moved.conj() @ k @ moved).real) for k in self._elements.values()])
+        share = strain / max(float(strain.sum()), 1e-300)
+        return self._kind(shape, kinetic), mode_name(self.assembly, tuple(self._elements), kinetic, share)
 
     def whirl(self, shape: Complexes) -> float:
-        """Sense of the whirl of a shape (size,), bodies by their lateral and tilting energy; see `NamedMode`."""
+        """Sense of the whirl of a shape (size,), bodies by their lateral and tilting energy.
+
+        It is 1 for a circular orbit in the sense of rotation of the body, -1 against it, 0 for a straight orbit and
+        where radial motion of rotating bodies is negligible.
+        """
         circling = total = 0.0
         energy = np.diag(self.system.mass)
         for body in self.assembly.bodies:
@@ -230,22 +235,6 @@ class ModeNamer:
         if total > LATERAL * whole:
             return float(circling / total)
         return 0.0
-
-    def _kinetic(self, shape: Complexes) -> Floats:
-        """Share of kinetic energy (bodies, motions) of the real and imaginary part, weighted by their energy."""
-        parts = (shape.real, shape.imag)
-        energies = [float(part @ self.system.mass @ part) for part in parts]
-        shares = np.zeros((len(self.assembly.bodies), len(BODY_MOTIONS)))
-        for part, energy in zip(parts, energies, strict=True):
-            if energy > 0.0:
-                moved = (self._turn @ part)[:, None]
-                shares += energy / sum(energies) * kinetic_shares(self.assembly, moved, self._q)[0]
-        return shares
-
-    def _words(self, shape: Complexes, kinetic: Floats) -> str:
-        moved = self._turn @ shape
-        strain = np.array([float((moved.conj() @ k @ moved).real) for k in self._elements.values()])
-        return mode_name(self.assembly, tuple(self._elements), kinetic, strain / max(float(strain.sum()), 1e-300))
 
     def _kind(self, shape: Complexes, kinetic: Floats) -> str:
         sets = [planets for planets in self.system.frame.sets if not planets.is_single]
@@ -292,15 +281,29 @@ def circle(x: complex, y: complex) -> float:
     return float(0.0 - 2.0 * (np.conj(x) * y).imag)
 
 
-LAYOUT: dict[str, tuple[str, ...]] = {
-    "campbell_speed": ("campbell_point",),
-    "mode_frequency": ("campbell_point", "mode"),
-    "mode_damping": ("campbell_point", "mode"),
-    "mode_whirl": ("campbell_point", "mode"),
-    "mode_over_angle": ("mode", "bound"),
-    "mode_kind": ("mode",),
-    "mode_name": ("mode",),
+_VARIABLES: dict[str, tuple[str, tuple[str, ...], dict[str, str]]] = {
+    "campbell_speed": ("speeds", ("campbell_point",), {"units": "rad/s", "long_name": "speed of the overall input"}),
+    "mode_frequency": (
+        "frequency",
+        ("campbell_point", "mode"),
+        {"units": "Hz", "long_name": "as seen from the housing"},
+    ),
+    "mode_damping": ("damping", ("campbell_point", "mode"), {"units": "1", "long_name": "share of critical damping"}),
+    "mode_whirl": (
+        "whirl",
+        ("campbell_point", "mode"),
+        {"units": "1", "long_name": "1 forward whirl, -1 backward whirl"},
+    ),
+    "mode_over_angle": (
+        "over_angle",
+        ("mode", "bound"),
+        {"units": "1", "long_name": "lowest and highest over the carrier's angle, over that at zero angle"},
+    ),
+    "mode_kind": ("kinds", ("mode",), {}),
+    "mode_name": ("names", ("mode",), {}),
 }
+"""Fields of a diagram by the variables of a file that holds it, with their dimensions and attributes."""
+LAYOUT = {name: over for name, (_, over, _) in _VARIABLES.items()}
 """Variables of a file that holds a diagram."""
 SAME_FREQUENCY = 0.02
 """Share of a frequency within which a mode is the one that a crossing was found at."""
@@ -315,14 +318,14 @@ class Campbell(ReprMixin, line=": {names!n} modes at {speeds!n} speeds"):
     frequency: Floats
     damping: Floats
     whirl: Floats
-    """(n, m) Hz as seen from the housing, share of critical damping, and sense of the whirl as `NamedMode` has it;
+    """(n, m) Hz as seen from the housing, share of critical damping, and sense of the whirl as of `ModeNamer.whirl`;
     NaN where a mode is none."""
     over_angle: Floats
     """(m, 2) lowest and highest frequency over the angle of the carrier, over that at zero angle, as
     `frequencies_over_angle` finds them."""
     kinds: tuple[str, ...]
     names: tuple[str, ...]
-    """As `NamedMode` has them, at the fastest speed."""
+    """As of `ModeNamer.named`, at the fastest speed."""
 
     def mode_at(self, speed: float, frequency: float) -> int | None:
         """Find the mode that has a frequency (Hz) at a speed (rad/s), None where none is near."""
@@ -337,19 +340,11 @@ class Campbell(ReprMixin, line=": {names!n} modes at {speeds!n} speeds"):
 
     def variables(self) -> dict[str, tuple[tuple[str, ...], Any, dict[str, str]]]:
         """Arrays with dimensions and units, as files hold them."""
-        values = {
-            "campbell_speed": (self.speeds, {"units": "rad/s", "long_name": "speed of the overall input"}),
-            "mode_frequency": (self.frequency, {"units": "Hz", "long_name": "as seen from the housing"}),
-            "mode_damping": (self.damping, {"units": "1", "long_name": "share of critical damping"}),
-            "mode_whirl": (self.whirl, {"units": "1", "long_name": "1 forward whirl, -1 backward whirl"}),
-            "mode_over_angle": (
-                self.over_angle,
-                {"units": "1", "long_name": "lowest and highest over the carrier's angle, over that at zero angle"},
-            ),
-            "mode_kind": (np.array(self.kinds, dtype=object), {}),
-            "mode_name": (np.array(self.names, dtype=object), {}),
-        }
-        return {name: (LAYOUT[name], array, attributes) for name, (array, attributes) in values.items()}
+        found = {}
+        for name, (field, over, attributes) in _VARIABLES.items():
+            own = getattr(self, field)
+            found[name] = over, np.array(own, dtype=object) if isinstance(own, tuple) else own, attributes
+        return found
 
 
 def modes_over_speed(system: MeanSystem, low: float, high: float, highest: float) -> ModeTracks:
@@ -400,27 +395,21 @@ def campbell_of(system: MeanSystem, tracks: ModeTracks) -> Campbell:
     whirl = np.full(tracks.frequency.shape, np.nan)
     for n, m in zip(*np.nonzero(~np.isnan(tracks.frequency)), strict=True):
         whirl[n, m] = namer.whirl(tracks.shapes[n, m])
-    named = [namer.named(tracks.shapes[_fastest(tracks, m), m]) for m in range(tracks.frequency.shape[1])]
+    # Modes are named at the fastest speed at which they are found.
+    found_at = np.where(np.isnan(tracks.frequency), -1.0, np.abs(tracks.speeds)[:, None])
+    named = [namer.named(tracks.shapes[n, m]) for m, n in enumerate(found_at.argmax(axis=0))]
     return Campbell(
         tracks.speeds,
         tracks.frequency,
         tracks.damping,
         whirl,
         frequencies_over_angle(system, tracks),
-        tuple(mode.kind for mode in named),
-        tuple(mode.name for mode in named),
+        tuple(kind for kind, _ in named),
+        tuple(name for _, name in named),
     )
 
 
 def campbell_from(data: xr.Dataset) -> Campbell:
     """Read a diagram from the dataset of a file that holds one."""
-    values = {name: data[name].to_numpy() for name in LAYOUT}
-    kinds, names = (tuple(str(value) for value in values[name]) for name in ("mode_kind", "mode_name"))
-    speeds, frequency, damping, whirl, over_angle = (values[name] for name in list(LAYOUT)[:5])
-    return Campbell(speeds, frequency, damping, whirl, over_angle, kinds, names)
-
-
-def _fastest(tracks: ModeTracks, mode: int) -> int:
-    """Place of the fastest speed at which a mode is one."""
-    known = np.flatnonzero(~np.isnan(tracks.frequency[:, mode]))
-    return int(known[np.argmax(np.abs(tracks.speeds[known]))])
+    values: dict[str, Any] = {field: data[name].to_numpy() for name, (field, _, _) in _VARIABLES.items()}
+    return Campbell(**values | {field: tuple(map(str, values[field])) for field in ("kinds", "names")})

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -24,7 +24,7 @@ from exugear.steady.balance.interface import Interface
 from exugear.steady.balance.model import HarmonicBalanceModel
 from exugear.steady.balance.response import mean_deviation_forces, transmission_errors
 from exugear.steady.campbell import ModeTracks
-from exugear.steady.harmonics.branches import NEIGHBOURS, predicted_tops, standing_peaks
+from exugear.steady.harmonics.branches import NEIGHBOURS, peaks_of_lines, predicted_tops
 from exugear.steady.mean_system.mean_system import MeanSystem, mean_modes
 from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT
 from exugear.steady.mean_system.signals import Quantity
@@ -123,23 +123,43 @@ def crossings(
         [_peak(model, followed.near(mode, speed), speed, forces[at], loads[at]) for mode, at, speed in met]
     )
     shares = _shares(peaks)
-    counted = _shares(peaks)
-    if operation is not None:
-        speeds = np.abs([speed for _, _, speed in met])
-        inside = (speeds >= operation[0]) & (speeds <= operation[1])
-        counted[inside] = _shares(peaks[inside])
+    counted = shares.copy()
+    inside = in_operation(np.array([speed for _, _, speed in met]), operation)
+    counted[inside] = _shares(peaks[inside])
     strongest = [n for n in np.argsort(-counted, kind="stable") if counted[n] >= LEAST_SHARE][:MOST]
     strongest.sort(key=lambda n: -shares[n])
+    system = model.system
 
     def exact(n: int) -> Crossing:
+        """Find a crossing with the mode as it is at that speed, by Rayleigh quotients from either side.
+
+        Ostrowski (1959); their error is cubed from one to the next, and the speed goes with them.
+        """
         mode, at, speed = met[n]
-        value = followed.near(mode, speed).value
-        near = Crossing(speed, lines[at], mode, value.imag / 2.0 / np.pi, -value.real / abs(value), float(shares[n]))
-        return _met(model.system, followed, model.lines.orders, near)
+        order = float(model.lines.orders[lines[at]])
+        start = followed.near(mode, speed)
+        found = Mode(complex(start.value.real, order * abs(speed)), start.shape, start.left)
+        crossed = speed
+        for _ in range(ROUNDS):
+            found = improved(found, system.mass, system.damping_at(crossed), system.stiffness_at(crossed))
+            crossed = float(np.copysign(found.value.imag / order, crossed))
+        if start.assurance(found, system.mass, system.damping_at(crossed)) < SAME:
+            found, crossed = start, speed
+        damping = float(-found.value.real / abs(found.value))
+        return Crossing(crossed, lines[at], mode, found.value.imag / 2.0 / np.pi, damping, float(shares[n]))
 
     low = tracks.speeds[0]
     high = tracks.speeds[-1]
     return tuple(crossing for crossing in side_by_side(exact, strongest) if low <= crossing.speed <= high)
+
+
+def in_operation(speeds: Floats, operation: tuple[float, float] | None) -> Booleans:
+    """Return which speeds (n,) are in an operating range, rad/s without sign; all without a range or a speed in it."""
+    if operation is not None:
+        inside = (np.abs(speeds) >= operation[0]) & (np.abs(speeds) <= operation[1])
+        if inside.any():
+            return np.asarray(inside)
+    return np.ones(len(speeds), dtype=bool)
 
 
 def _shares(peaks: Floats) -> Floats:
@@ -179,17 +199,12 @@ def missed_tops(
         return np.zeros(0)
     known = {} if known is None else known
     tops: list[float] = []
-    inside = np.ones(len(speeds), dtype=bool)
-    if operation is not None:
-        inside = (np.abs(speeds) >= operation[0]) & (np.abs(speeds) <= operation[1])
+    inside = in_operation(speeds, operation)
     for quantity in quantities:
         sizes = quantity.sizes(amplitude[:, 1:])
         argmax = sizes.argmax(axis=2)
         highest = np.take_along_axis(sizes, argmax[..., None], axis=2)[..., 0]
-        peaks = [
-            (point, line) for line in range(highest.shape[1]) for point in standing_peaks(highest[:, line], LEAST_STAND)
-        ]
-        peaks.sort(key=lambda peak: -highest[peak])
+        peaks = sorted(peaks_of_lines(highest, LEAST_STAND), key=lambda peak: -highest[peak])
         loudest = dict.fromkeys(peaks[:LOUDEST]) | dict.fromkeys([peak for peak in peaks if inside[peak[0]]][:LOUDEST])
         keys: dict[tuple[int, int], tuple[str, int, int, int, bytes]] = {}
         # Curves at one place whose peaks have as many neighbours on either side are evaluated together.
@@ -235,21 +250,12 @@ def missed_flanks(
     Near the top A of a resonance the amplitude at a distance d is A / sqrt(1 + (d / w)^2). The first point below A / 2
     on a flank gives w. Other modes may add to that point, and w is too large; the next call then comes closer.
     """
-    inside = np.ones(len(speeds), dtype=bool)
-    if operation is not None:
-        within = (np.abs(speeds) >= operation[0]) & (np.abs(speeds) <= operation[1])
-        inside = within if within.any() else inside
+    inside = in_operation(speeds, operation)
     more: list[float] = []
     for quantity in quantities:
         sizes = quantity.sizes(amplitude[:, 1:]).max(axis=2)
-        peaks = [
-            (int(point), line)
-            for line, amplitudes in enumerate(sizes.T)
-            for point in standing_peaks(amplitudes)
-            if inside[point]
-        ]
-        peaks.sort(key=lambda peak: -sizes[peak])
-        for point, line in peaks[:DRAWN]:
+        peaks = [peak for peak in peaks_of_lines(sizes) if inside[peak[0]]]
+        for point, line in sorted(peaks, key=lambda peak: -sizes[peak])[:DRAWN]:
             if smooth[_around(point, len(speeds))].all():
                 for side in (slice(point, None), slice(point, None, -1)):
                     more += _on_flank(speeds[side], sizes[side, line])
@@ -334,29 +340,11 @@ def _peak(model: HarmonicBalanceModel, followed: Mode, speed: float, force: Comp
     return np.asarray(np.abs(rows @ followed.shape) * pushed / abs(followed.value.real))
 
 
-def _met(system: MeanSystem, followed: FollowedModes, orders: Floats, near: Crossing) -> Crossing:
-    """Find a crossing with the mode as it is at that speed, by Rayleigh quotients from either side.
-
-    Ostrowski (1959); their error is cubed from one to the next, and the speed goes with them.
-    """
-    order = float(orders[near.line])
-    at = near.speed
-    start = followed.near(near.mode, at)
-    mode = Mode(complex(start.value.real, order * abs(at)), start.shape, start.left)
-    for _ in range(ROUNDS):
-        mode = improved(mode, system.mass, system.damping_at(at), system.stiffness_at(at))
-        at = float(np.copysign(mode.value.imag / order, at))
-    if start.assurance(mode, system.mass, system.damping_at(at)) < SAME:
-        return near
-    damping = float(-mode.value.real / abs(mode.value))
-    return replace(near, speed=at, frequency=mode.value.imag / 2.0 / np.pi, damping=damping)
-
-
 def improved(mode: Mode, mass: Floats, damping: Floats, stiffness: Floats) -> Mode:
     """Improve a mode by inverse iteration of its shapes and the Rayleigh quotient of both."""
     slope = 2.0 * mode.value * mass + damping
     matrix = mode.value**2 * mass + mode.value * damping + stiffness
-    # With few degrees of freedom the eigenvalue may be exact to the last bit, and the matrix exactly singular. A pivot
+    # With few degrees of freedom the eigenvalue may be exact to the last bit, and the matrix crossed singular. A pivot
     # of round-off in place of zero then gives the shape to full accuracy (Wilkinson 1965, as in LAPACK's xHSEIN).
     factor, pivots, _ = scipy.linalg.lapack.zgetrf(matrix)
     diagonal = np.einsum("ii->i", factor)

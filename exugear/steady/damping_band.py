@@ -17,7 +17,8 @@ import numpy as np
 from exugear.gearbox.load_cases import operating_range
 from exugear.steady.balance.model import HarmonicBalanceModel
 from exugear.steady.balance.response import linear_response, parametric_response, signals
-from exugear.steady.harmonics.branches import standing_peaks
+from exugear.steady.crossings import in_operation
+from exugear.steady.harmonics.branches import peaks_of_lines
 from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.steady.mean_system.signals import Quantity
 from exugear.steady.settings import Method
@@ -155,28 +156,19 @@ def _highest_peaks(
 
     Within the operating range, where the file has one and the response reaches it.
     """
-    stated = operating_range(model.waves.assembly.gearbox)
-    inside = np.ones(len(speed), dtype=bool)
-    if stated is not None:
-        within = (np.abs(speed) >= stated[0]) & (np.abs(speed) <= stated[1])
-        if within.any():
-            inside = within
+    inside = in_operation(speed, operating_range(model.waves.assembly.gearbox))
     chosen: set[tuple[int, int]] = set()
     of_quantity: list[set[tuple[int, int]]] = []
     for quantity in quantities:
         size = quantity.sizes(amplitude[:, 1:]).max(axis=2)
-        peaks = [
-            (int(point), line)
-            for line, amplitudes in enumerate(size.T, start=1)
-            for point in standing_peaks(amplitudes)
-        ]
+        peaks = peaks_of_lines(size)
         of_quantity.append(set(peaks))
-        peaks = sorted((peak for peak in peaks if inside[peak[0]]), key=lambda peak: -size[peak[0], peak[1] - 1])
-        chosen |= {peak for peak in peaks[:MOST_PEAKS] if size[peak[0], peak[1] - 1] > 0.0}
+        peaks = sorted((peak for peak in peaks if inside[peak[0]]), key=lambda peak: -size[peak])
+        chosen |= {peak for peak in peaks[:MOST_PEAKS] if size[peak] > 0.0}
     ordered = sorted(chosen)
     rises = np.array([[peak in peaks for peaks in of_quantity] for peak in ordered], dtype=bool)
     point, line = np.array(ordered, dtype=np.int64).reshape(-1, 2).T
-    return point, line, rises.reshape(len(ordered), len(quantities))
+    return point, line + 1, rises.reshape(len(ordered), len(quantities))
 
 
 def no_band(quantities: tuple[str, ...]) -> DampingBand:

@@ -45,12 +45,7 @@ UPPER_ESTIMATE = (
 
 
 def response_findings(data: xr.Dataset) -> tuple[Finding, ...]:
-    """Check a response.
-
-    Parameters
-    ----------
-    data : as `exugear.steady.steady_file.load_response` reads it
-    """
+    """Check a response, as `exugear.steady.steady_file.load_response` reads it."""
     return (*_balance(data), *_speeds(data), *_models(data), *_passing(data), *_excitation(data), *_sound(data))
 
 
@@ -166,7 +161,7 @@ def _models(data: xr.Dataset) -> Iterator[Finding]:
     """Range of the models of meshes, bearings and planets."""
     model = str(data.attrs["mesh_model"])
     for pull in () if LAWS[model].loses_contact else pulls(data):
-        text = f"{pull.mesh}: tensile mesh force at {pull.count} of {data.sizes['point']} speeds, at most "
+        text = f"{pull.name}: tensile mesh force at {pull.count} of {data.sizes['point']} speeds, at most "
         text += f"{100.0 * pull.share:.2g} % of the time at {_rpm(pull.speed)}; amplitudes there are invalid, because "
         text += f"the model {model} neglects contact loss; use {_in_time(data, ' --mesh-model table')}"
         yield Finding("warning", text, pull.share)
@@ -191,7 +186,7 @@ def _models(data: xr.Dataset) -> Iterator[Finding]:
         text = f"nonlinear bearings are linearised at the static load; {_in_time(data)} evaluates the nonlinear model"
         yield Finding("note", text)
     if swings := bearing_swings(data):
-        loads = [f"{own.bearing} {_percent(own.share)} at {_rpm(own.speed)}" for own in swings[:SHOWN_BEARINGS]]
+        loads = [f"{own.name} {_percent(own.share)} at {_rpm(own.speed)}" for own in swings[:SHOWN_BEARINGS]]
         more = f"; and {len(swings) - SHOWN_BEARINGS} more" if len(swings) > SHOWN_BEARINGS else ""
         text = (
             f"dynamic load of bearings over {100.0 * STRAINED:.0f} % of their static load ({'; '.join(loads)}{more}): "

@@ -1,19 +1,20 @@
-"""Peaks of a stored steady-state response: dominant orders by speed, their sidebands, and their height in a run-up."""
+"""Peaks of a stored steady-state response: dominant orders by speed, their sidebands, and loads outside a linear range.
+
+Responses are given as `exugear.steady.steady_file.load_response` reads them.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from exugear.results.spectra.resonances import OrderCut, sweep_severity
-from exugear.results.spectra.waterfall import SAME_ORDER, OrderLine
 from exugear.steady.harmonics.branches import standing_peaks
 from exugear.steady.mean_system.planet_sets import SteadyError
-from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.arrays import Complexes, Floats, Integers
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
 
 LEAST_SPEEDS = 3
 """Speeds without which nothing stands out."""
-SAME_SPEED = 0.02
-"""Share of the speed within which a peak belongs to the crossing of its line with a mode."""
 DRAWN, MANY_TURNS = 4096, 2e4
 """Number of angles of the input at which contact loss is checked, and the range from which they are drawn, rad."""
 HEARD = 1e-4
@@ -72,7 +71,6 @@ def peaks(data: xr.Dataset, signal: str = "overall_dte", least: float = 0.01) ->
 
     Parameters
     ----------
-    data : as `exugear.steady.steady_file.load_response` reads it
     least : share of the highest peak below which a peak is omitted
 
     Raises
@@ -126,20 +124,21 @@ def _tops(values: Floats) -> Integers:
     return standing_peaks(values)
 
 
-def sidebands(data: xr.Dataset, peak: Peak, signal: str = "overall_dte", least: float = 0.01) -> tuple[Sideband, ...]:
-    """Return orders that differ from a peak's by integer multiples of the other mesh frequencies, largest first.
+def sidebands(data: xr.Dataset, peak: Peak, least: float = 0.01) -> tuple[Sideband, ...]:
+    """Return orders of the overall transmission error beside that of a peak, largest first.
+
+    They differ from it by integer multiples of the other mesh frequencies.
 
     Parameters
     ----------
-    data : as `exugear.steady.steady_file.load_response` reads it
-    peak : of it
+    peak : of the response
     least : share of the peak below which an order is omitted
     """
     point, centre = _place(data, peak)
     index = data["index"].to_numpy()
     bases = tuple(str(name) for name in data["base"].to_numpy())
     names = [str(name) for name in data["signal"].to_numpy()]
-    values: Floats = data["amplitude"].to_numpy()[point, :, names.index(signal)].astype(np.float64)
+    values: Floats = data["amplitude"].to_numpy()[point, :, names.index("overall_dte")].astype(np.float64)
     # Passing planets are beside what a mesh excites, however many times they pass.
     of_meshes = np.array([base != data.attrs.get("varying_carrier") for base in bases])
     carrying = int(np.argmax(np.abs(index[centre]) * of_meshes))
@@ -173,26 +172,20 @@ def planet_sidebands(
 
     Parameters
     ----------
-    data : as `exugear.steady.steady_file.load_response` reads it
-    peak : of it
+    peak : of the response
     carriers : mapping of family of meshes to (str, float)
         Carrier of the planets and its revolutions per revolution of the input.
     least : share of the common force of all planets, or of the largest order, below which an order is omitted
     """
     point, line = _place(data, peak)
     names = [str(name) for name in data["signal"].to_numpy()]
-
-    def coefficient(name: str) -> complex:
-        place = {"point": point, "line": line, "signal": names.index(name)}
-        selected = data[["amplitude", "phase"]].isel(place)
-        return complex(float(selected["amplitude"]) * np.exp(1j * float(selected["phase"])))
-
     found = []
     for family, (carrier, ratio) in carriers.items():
         waves = [f"mesh_force {family}{wave}" for wave in ("", " cosine", " sine")]
         if not set(waves) <= set(names):
             continue
-        mean, cosine, sine = (coefficient(name) for name in waves)
+        places = [names.index(name) for name in waves]
+        mean, cosine, sine = _amplitudes(data.isel(point=point, line=line), places)
         turning = ratio * peak.speed
         felt = {1: 0.5 * abs(cosine - 1j * sine), -1: 0.5 * abs(cosine + 1j * sine)}
         largest = max(abs(mean), *felt.values(), 1e-300)
@@ -206,6 +199,12 @@ def planet_sidebands(
     return tuple(sorted(found, key=lambda band: -band.share))
 
 
+def _amplitudes(data: xr.Dataset, signals: list[int]) -> Complexes:
+    """Complex amplitudes (..., signals) of some signals, of line 0 the mean."""
+    chosen = data[["amplitude", "phase"]].isel(signal=signals)
+    return np.asarray(chosen["amplitude"].to_numpy() * np.exp(1j * chosen["phase"].to_numpy().astype(np.float64)))
+
+
 def _place(data: xr.Dataset, peak: Peak) -> tuple[int, int]:
     """Point and line of a peak."""
     orders: Floats = data["order"].to_numpy()
@@ -213,35 +212,37 @@ def _place(data: xr.Dataset, peak: Peak) -> tuple[int, int]:
 
 
 @dataclass(frozen=True)
-class TensileMesh:
-    """A mesh with tensile force: in reality the teeth lose contact, which a bilateral model neglects."""
+class Excess:
+    """A mesh or a bearing whose load is outside the range of a linear model at some of the speeds."""
 
-    mesh: str
-    """Name; of planets the family."""
+    name: str
+    """Mesh or bearing; of planets the family."""
     count: int
     """At how many of the speeds."""
     speed: float
-    """Of the input where it pulls longest, rad/s."""
+    """Of the input where the share is largest, rad/s."""
     share: float
-    """Of the time there."""
+    """Share of the time with tensile mesh force; maximum reduction of a bearing's static load by the vibration."""
 
 
-def pulls(data: xr.Dataset) -> tuple[TensileMesh, ...]:
+def _excesses(data: xr.Dataset, shares: Mapping[str, Floats]) -> tuple[Excess, ...]:
+    """Return what has shares (n,) above zero at any of the speeds, the largest share first."""
+    found = [
+        Excess(name, int((own > 0.0).sum()), float(data["speed"][int(own.argmax())]), float(own.max()))
+        for name, own in shares.items()
+        if own.max() > 0.0
+    ]
+    return tuple(sorted(found, key=lambda excess: -excess.share))
+
+
+def pulls(data: xr.Dataset) -> tuple[Excess, ...]:
     """Return the meshes whose force changes its sign relative to the static force, longest tensile time first.
 
-    The orders of a speed are added at angles of the input drawn at random (`DRAWN`, the same each time). For planets it
-    is the planet with the largest unloading by the multi-blade components.
-
-    Parameters
-    ----------
-    data : as `exugear.steady.steady_file.load_response` reads it
+    In reality their teeth lose contact, which a bilateral model neglects. The orders of a speed are added at angles of
+    the input drawn at random (`DRAWN`, the same each time). For planets it is the planet with the largest unloading by
+    the multi-blade components.
     """
-    found = []
-    for mesh, shares in tensile_fractions(data).items():
-        most = int(np.argmax(shares))
-        if shares[most] > 0.0:
-            found.append(TensileMesh(mesh, int((shares > 0.0).sum()), float(data["speed"][most]), float(shares[most])))
-    return tuple(sorted(found, key=lambda pull: -pull.share))
+    return _excesses(data, tensile_fractions(data))
 
 
 def tensile_fractions(data: xr.Dataset) -> dict[str, Floats]:
@@ -250,133 +251,42 @@ def tensile_fractions(data: xr.Dataset) -> dict[str, Floats]:
     for place, name in enumerate(map(str, data["signal"].to_numpy())):
         if name.startswith("mesh_force "):
             places.setdefault(name.split(" ")[1], []).append(place)
-    return {mesh: _pulling(data, signals) for mesh, signals in places.items()}
-
-
-def _pulling(data: xr.Dataset, places: list[int]) -> Floats:
-    """Fraction of time at each speed with tensile mesh force, from its components: common one first, then others."""
-    selected = data[["amplitude", "phase"]].isel(signal=places)
-    force = selected["amplitude"].to_numpy() * np.exp(1j * selected["phase"].to_numpy().astype(np.float64))
-    static = force[:, 0, 0].real
-    force *= np.where(static < 0.0, -1.0, 1.0)[:, None, None]
-    swing = np.abs(force).sum(axis=(1, 2)) - np.abs(static)
     angles = np.random.default_rng(0).uniform(0.0, MANY_TURNS, DRAWN)
-    shares = np.zeros(len(static))
-    for point in np.flatnonzero(swing >= np.abs(static)):
-        lines = np.flatnonzero(np.abs(force[point]).max(axis=1) > HEARD * np.abs(static[point]))
-        turning = np.exp(1j * np.outer(angles, data["order"].to_numpy()[lines]))
-        waves = (turning @ force[point, lines]).real
-        shares[point] = np.mean(waves[:, 0] < np.hypot.reduce(waves[:, 1:], axis=1, initial=0.0))
-    return shares
+    found = {}
+    for mesh, components in places.items():
+        # The component that all planets have in common comes first.
+        force = _amplitudes(data, components)
+        static = force[:, 0, 0].real
+        force *= np.where(static < 0.0, -1.0, 1.0)[:, None, None]
+        swing = np.abs(force).sum(axis=(1, 2)) - np.abs(static)
+        found[mesh] = np.zeros(len(static))
+        for point in np.flatnonzero(swing >= np.abs(static)):
+            lines = np.flatnonzero(np.abs(force[point]).max(axis=1) > HEARD * np.abs(static[point]))
+            turning = np.exp(1j * np.outer(angles, data["order"].to_numpy()[lines]))
+            waves = (turning @ force[point, lines]).real
+            found[mesh][point] = np.mean(waves[:, 0] < np.hypot.reduce(waves[:, 1:], axis=1, initial=0.0))
+    return found
 
 
-@dataclass(frozen=True)
-class BearingLoadExcursion:
-    """A linear bearing with so large load amplitudes about the static load that it is outside the linear range."""
-
-    bearing: str
-    count: int
-    """At how many of the speeds."""
-    speed: float
-    """Speed of the input at the largest amplitude, rad/s."""
-    share: float
-    """Maximum reduction of the static load by the vibration; from 1 on the bearing is unloaded."""
-
-
-def bearing_swings(data: xr.Dataset) -> tuple[BearingLoadExcursion, ...]:
+def bearing_swings(data: xr.Dataset) -> tuple[Excess, ...]:
     """Return linear bearings whose vibration reaches `STRAINED` of the static load or more, the largest ratio first.
 
-    The orders of a speed are added as if in phase, along the static load. Planet bearings, whose load rotates in fixed
-    axes, are not checked.
-
-    Parameters
-    ----------
-    data : as `exugear.steady.steady_file.load_response` reads it
+    They are outside their linear range, and unloaded from a ratio of 1 on. The orders of a speed are added as if in
+    phase, along the static load. Planet bearings, whose load rotates in fixed axes, are not checked.
     """
-    swings = []
-    for bearing, shares in dynamic_load_ratios(data).items():
-        most = int(np.nanargmax(shares))
-        if shares[most] >= STRAINED:
-            count = int((shares >= STRAINED).sum())
-            swings.append(BearingLoadExcursion(bearing, count, float(data["speed"][most]), float(shares[most])))
-    return tuple(sorted(swings, key=lambda swing: -swing.share))
+    ratios = dynamic_load_ratios(data)
+    return _excesses(data, {name: np.where(own >= STRAINED, own, 0.0) for name, own in ratios.items()})
 
 
 def dynamic_load_ratios(data: xr.Dataset) -> dict[str, Floats]:
     """Return dynamic over static load at each speed (n,) of the bearings that `bearing_swings` checks."""
     names = [str(name) for name in data["signal"].to_numpy()]
     ratios = {}
-    for bearing, static in json.loads(data.attrs["bearing_static_loads"]).items():
+    for bearing, load in json.loads(data.attrs["bearing_static_loads"]).items():
         signals = [f"support_force {bearing} {axis}" for axis in "xyz"]
         if set(signals) <= set(names):
-            ratios[bearing] = _swinging(data, [names.index(name) for name in signals], np.array(static))
+            static = np.array(load)
+            # The largest vibration is along the static load, over which it counts.
+            force = _amplitudes(data.isel(line=slice(1, None)), [names.index(name) for name in signals])
+            ratios[bearing] = np.nan_to_num(np.abs(force @ static).sum(axis=1)) / (static @ static)
     return ratios
-
-
-def _swinging(data: xr.Dataset, places: list[int], static: Floats) -> Floats:
-    """Largest vibration along a static load (3,) at each speed, over that load."""
-    selected = data[["amplitude", "phase"]].isel(signal=places, line=slice(1, None))
-    force = selected["amplitude"].to_numpy() * np.exp(1j * selected["phase"].to_numpy().astype(np.float64))
-    return np.asarray(np.nan_to_num(np.abs(force @ static).sum(axis=1)) / (static @ static))
-
-
-@dataclass(frozen=True)
-class ComparedPeak:
-    """A peak of a steady-state response and its amplitude in a run-up."""
-
-    peak: Peak
-    damping: float | None
-    """Share of critical damping of the mode that is met there, where one is known."""
-    run_amplitude: float
-    """Largest of the run-up near that speed, in the signal's unit."""
-    severity: float | None
-    """Of the sweep, as `exugear.results.spectra.resonances.sweep_severity` has it."""
-    run_rank: int
-    """Rank among the peaks by the run-up's amplitude, 1 for the highest."""
-
-
-def damping_at(data: xr.Dataset, peak: Peak) -> float | None:
-    """Damping of the mode that the line of a peak crosses there, None where none is known."""
-    orders = data["order"].to_numpy()
-    near = []
-    for crossing in json.loads(data.attrs["crossings"]):
-        same = abs(orders[crossing["line"]] - peak.order) < SAME_ORDER * peak.order
-        apart = abs(crossing["speed"] - peak.speed)
-        if same and apart < SAME_SPEED * abs(peak.speed):
-            near.append((apart, float(crossing["damping"])))
-    if near:
-        return min(near)[1]
-    return None
-
-
-def compared_peaks(
-    data: xr.Dataset, cut: Callable[[OrderLine], OrderCut], rate: float, most: int = 20, signal: str = "overall_dte"
-) -> tuple[ComparedPeak, ...]:
-    """Return the highest peaks of single mesh frequencies with their amplitudes in a run-up, highest first.
-
-    Parameters
-    ----------
-    data : steady-state response of the same variant
-    cut : from an order to its cut out of the run-up, as `exugear.results.spectra.resonances.run_up_cut` makes it
-    rate : at which order one sweeps, Hz/s
-    most : maximum number of peaks
-    """
-    index = data["index"].to_numpy()
-    orders = data["order"].to_numpy()
-    alone = orders[np.count_nonzero(index, axis=1) == 1]
-    found = [peak for peak in peaks(data, signal) if np.abs(alone - peak.order).min() < SAME_ORDER * peak.order][:most]
-    cuts = {peak.order: cut(OrderLine(peak.line, peak.order)) for peak in found}
-    heard = [_amplitude_near(cuts[peak.order], abs(peak.speed)) for peak in found]
-    louder = np.argsort(np.argsort([-amplitude for amplitude in heard], kind="stable"), kind="stable")
-    out = []
-    for peak, amplitude, place in zip(found, heard, louder, strict=True):
-        damping = damping_at(data, peak)
-        severity = None if damping is None else sweep_severity(peak.frequency, damping, rate * peak.order)
-        out.append(ComparedPeak(peak, damping, amplitude, severity, int(place) + 1))
-    return tuple(out)
-
-
-def _amplitude_near(cut: OrderCut, speed: float) -> float:
-    """Largest amplitude of a cut near a speed, zero where it does not pass."""
-    passed = np.abs(np.abs(cut.speed) / speed - 1.0) <= SWEEP_SHIFT
-    return float(np.abs(cut.amplitude[passed]).max(initial=0.0))

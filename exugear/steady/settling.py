@@ -13,13 +13,12 @@ import numpy as np
 
 from exugear.steady.harmonics.lines import LineSet
 from exugear.steady.mean_system.mean_system import MeanSystem
-from exugear.steady.mean_system.planet_sets import PlanetSet
 from exugear.steady.mean_system.rotating_frame import RotatingFrame
 from exugear.system.kernels.coordinates import TILT
 from exugear.system.loads import Drive, LoadTable
 from exugear.system.system import Assembly
 from exugear.transient.compiled.solver import CompiledSystem, unsupported_reason
-from fe_ste.tools.arrays import Complexes, Floats, Integers
+from fe_ste.tools.arrays import Complexes, Floats
 
 
 def frame_coordinates(frame: RotatingFrame, q: Floats, psi: Floats) -> Floats:
@@ -35,31 +34,26 @@ def frame_coordinates(frame: RotatingFrame, q: Floats, psi: Floats) -> Floats:
     u = q - np.outer(psi, assembly.rolling_velocity(still, frame.speeds))
     bend = assembly.rolling_acceleration(still, frame.speeds, dict.fromkeys(frame.speeds, 0.0))
     for planets, coordinates in frame.rings:
-        if coordinates[0, 0] >= 0:
-            _turn_back(u, q, planets, coordinates, psi, bend)
-        shapes = planets.values(planets.ratio * psi)
+        turned = planets.ratio * psi
+        # Displacements and tilts turn from fixed axes to radius and tangent.
+        for angle, places in zip(planets.angles, coordinates, strict=True) if coordinates[0, 0] >= 0 else ():
+            along = places[:2]
+            # The centripetal acceleration points back along the radius.
+            radius = -bend[along] / planets.ratio**2 if planets.ratio else np.zeros(2)
+            u[:, along] = q[:, along] - _rotated(np.broadcast_to(radius, (len(psi), 2)), turned) + radius
+            for first in (0, TILT):
+                at = places[first : first + 2]
+                u[:, at] = _rotated(u[:, at], -(turned + angle))
+        shapes = planets.values(turned)
         back = shapes / (shapes**2).sum(axis=1, keepdims=True)
         for axis in range(coordinates.shape[1]):
             if coordinates[0, axis] >= 0:
                 u[:, coordinates[:, axis]] = np.einsum("spw,sp->sw", back, u[:, coordinates[:, axis]])
     for carrier in frame.carriers:
         modal = assembly.elastic_slices[carrier.name].start + carrier.modal
-        turned = np.array([carrier.turned(float(angle))[0] for angle in psi])
-        u[:, modal] = np.linalg.solve(turned, u[:, modal, None])[..., 0]
+        modes = np.array([carrier.turned(float(angle))[0] for angle in psi])
+        u[:, modal] = np.linalg.solve(modes, u[:, modal, None])[..., 0]
     return u
-
-
-def _turn_back(u: Floats, q: Floats, planets: PlanetSet, own: Integers, psi: Floats, bend: Floats) -> None:
-    """Transform displacements and tilts of planets from fixed axes to radius and tangent, in place."""
-    turned = planets.ratio * psi
-    for angle, places in zip(planets.angles, own, strict=True):
-        along = places[:2]
-        # The centripetal acceleration points back along the radius.
-        radius = -bend[along] / planets.ratio**2 if planets.ratio else np.zeros(2)
-        u[:, along] = q[:, along] - _rotated(np.broadcast_to(radius, (len(psi), 2)), turned) + radius
-        for first in (0, TILT):
-            at = places[first : first + 2]
-            u[:, at] = _rotated(u[:, at], -(turned + angle))
 
 
 def _rotated(plane: Floats, angle: Floats) -> Floats:

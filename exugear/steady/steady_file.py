@@ -40,29 +40,28 @@ from fe_ste.tools.stores import Layout, Store, load_dataset
 if TYPE_CHECKING:
     import xarray as xr
 
+_OVER = {
+    "speed": ("point",),
+    "index": ("line", "base"),
+    "order": ("line",),
+    "amplitude": ("point", "line", "signal"),
+    "phase": ("point", "line", "signal"),
+    "units": ("signal",),
+    "drive_torque": ("point",),
+    "energy_error": ("point",),
+    "growth": ("point",),
+    "loads_at_mean_angles": ("point",),
+    "remark": ("point",),
+    "left_out": ("mesh_wave",),
+    "contact_loss_fraction": ("point", "mesh_wave"),
+}
+"""Dimensions of the variables of a response itself."""
 _LAYOUT = Layout(
     "steady-state response",
     STEADY,
-    {
-        "speed": ("point",),
-        "index": ("line", "base"),
-        "order": ("line",),
-        "amplitude": ("point", "line", "signal"),
-        "phase": ("point", "line", "signal"),
-        "units": ("signal",),
-        "drive_torque": ("point",),
-        "energy_error": ("point",),
-        "growth": ("point",),
-        "loads_at_mean_angles": ("point",),
-        "remark": ("point",),
-        "contact_loss_fraction": ("point", "mesh_wave"),
-        "left_out": ("mesh_wave",),
-        "band_point": ("peak",),
-        "band_line": ("peak",),
-        "band_amplitude": ("peak", "quantity", "damping_limit"),
-        "quantity": ("quantity",),
-    }
-    | {name: (name,) for name in ("base", "signal", "mesh_wave")}
+    _OVER
+    | {"band_point": ("peak",), "band_line": ("peak",), "band_amplitude": ("peak", "quantity", "damping_limit")}
+    | {name: (name,) for name in ("quantity", "base", "signal", "mesh_wave")}
     | LAYOUT,
     (
         "gearbox",
@@ -91,58 +90,48 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
     import xarray as xr
 
     solved = response.solved
-    amplitude = response.solved.amplitude
-    variables: dict[str, tuple[tuple[str, ...], Any, dict[str, str]]] = {
-        "speed": (("point",), solved.speed, {"units": "rad/s", "long_name": "speed of the overall input"}),
-        "index": (
-            ("line", "base"),
-            response.lines.index,
-            {"units": "1", "long_name": ("multiples of the base frequencies")},
-        ),
-        "order": (("line",), response.lines.orders, {"units": "1", "long_name": "periods per input revolution"}),
+    amplitude = solved.amplitude
+    values: dict[str, tuple[Any, dict[str, str]]] = {
+        "speed": (solved.speed, {"units": "rad/s", "long_name": "speed of the overall input"}),
+        "index": (response.lines.index, {"units": "1", "long_name": "multiples of the base frequencies"}),
+        "order": (response.lines.orders, {"units": "1", "long_name": "periods per input revolution"}),
         "amplitude": (
-            ("point", "line", "signal"),
             np.abs(amplitude).astype(np.float32),
             {"units": "see units", "long_name": "peak amplitude; of line 0 the mean"},
         ),
         "phase": (
-            ("point", "line", "signal"),
             np.angle(amplitude).astype(np.float32),
             {"units": "rad", "long_name": "against cos(order * angle of the input)"},
         ),
-        "units": (("signal",), np.array([signal.units for signal in response.signals], dtype=object), {}),
-        "drive_torque": (("point",), solved.drive_torque, {"units": "N m"}),
-        "energy_error": (("point",), solved.energy_error, {"units": "1"}),
-        "growth": (("point",), solved.growth, {"units": "1/s", "long_name": "largest growth rate of a disturbance"}),
+        "units": (np.array([signal.units for signal in response.signals], dtype=object), {}),
+        "drive_torque": (solved.drive_torque, {"units": "N m"}),
+        "energy_error": (solved.energy_error, {"units": "1"}),
+        "growth": (solved.growth, {"units": "1/s", "long_name": "largest growth rate of a disturbance"}),
         "loads_at_mean_angles": (
-            ("point",),
             solved.mean_angles.astype(np.int8),
             {"units": "1", "long_name": "1 where stated loads do not settle at the angles that include the vibration"},
         ),
-        "remark": (("point",), solved.remark.astype(object), {}),
+        "remark": (solved.remark.astype(object), {}),
         "left_out": (
-            ("mesh_wave",),
             response.left_out,
             {"units": "1", "long_name": "fraction of the compliance variation above the harmonics"},
         ),
-        "contact_loss_fraction": (
-            ("point", "mesh_wave"),
-            solved.apart,
-            {"units": "1", "long_name": "contact-loss fraction"},
-        ),
+        "contact_loss_fraction": (solved.apart, {"units": "1", "long_name": "contact-loss fraction"}),
+    }
+    variables: dict[str, tuple[tuple[str, ...], Any, dict[str, str]]] = {
+        name: (over, *values[name]) for name, over in _OVER.items()
     }
     variables |= response.band.variables()
-    if response.bearing_names:
-        words = "fraction of time in which a bearing is unloaded (no rolling element in contact)"
-        variables["unloaded_fraction"] = (("point", "bearing"), solved.free, {"units": "1", "long_name": words})
     variables |= response.campbell.variables()
     coordinates: dict[str, Any] = {
         "mesh_wave": np.array(response.wave_names, dtype=object),
         "base": np.array(response.base_names, dtype=object),
         "signal": np.array([signal.name for signal in response.signals], dtype=object),
+        "quantity": np.array(response.band.quantities, dtype=object),
     }
-    coordinates["quantity"] = np.array(response.band.quantities, dtype=object)
     if response.bearing_names:
+        words = "fraction of time in which a bearing is unloaded (no rolling element in contact)"
+        variables["unloaded_fraction"] = (("point", "bearing"), solved.free, {"units": "1", "long_name": words})
         coordinates["bearing"] = np.array(response.bearing_names, dtype=object)
     if response.radiated is not None:
         velocity = np.abs(amplitude[..., response.signals.index(SURFACE_VELOCITY)]).astype(np.float64)

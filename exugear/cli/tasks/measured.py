@@ -14,8 +14,7 @@ from exugear.cli.watched import WatchedProject
 from exugear.gearbox.reading import GearboxFileError
 from exugear.results.findings import Finding
 from exugear.results.order_tracking.angle_cuts import TooShortError
-from exugear.steady.evaluation.fit import FitError, ParameterFit
-from exugear.steady.evaluation.fitted_response import start_of_fit
+from exugear.steady.evaluation.fit import FitError, ParameterFit, start_of_fit
 from exugear.steady.evaluation.measured_comparison import DRAWN_UNITS
 from exugear.steady.evaluation.run_up import read_run_up, response_settings
 from exugear.steady.settings import Method, check_law

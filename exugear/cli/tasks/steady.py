@@ -151,7 +151,7 @@ def summarise(
         "truncation_of_compliance": {str(wave): float(share) for wave, share in shares if " " not in str(wave)},
         "change_with_more_harmonics": finite_or_none(float(data.attrs["change_with_more"])),
         "meshes_that_pull": [
-            {"mesh": pull.mesh, "speeds": pull.count, "worst_speed_rpm": pull.speed / RPM, "share_of_time": pull.share}
+            {"mesh": pull.name, "speeds": pull.count, "worst_speed_rpm": pull.speed / RPM, "share_of_time": pull.share}
             for pull in (() if law.loses_contact else pulls(data))
         ],
         "not_converged": [
@@ -196,7 +196,7 @@ def summarise(
         ],
         "bearings_outside_linear_range": [
             {
-                "bearing": swing.bearing,
+                "bearing": swing.name,
                 "speeds": swing.count,
                 "worst_speed_rpm": swing.speed / RPM,
                 "share_of_static_load": swing.share,

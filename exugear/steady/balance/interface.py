@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from exugear.steady.mean_system.bearing_waves import BearingMean
-from exugear.steady.mean_system.mesh_places import DEFLECTION, MeshInterface
+from exugear.steady.mean_system.mesh_places import MeshInterface
 from exugear.steady.mean_system.signals import SignalRows
 from fe_ste.tools.arrays import Complexes, Floats, Integers
 
@@ -72,11 +72,6 @@ class Interface:
             found += self.read(self.loads.motion)
         found[0] += self.ports.static
         return found
-
-    @cached_property
-    def deflection(self) -> Complexes:
-        """Deflections (n, m, m, f) under a unit of each force."""
-        return _taken(self.ports.readings[:, DEFLECTION], self.motion)
 
     @cached_property
     def deflection_per_force(self) -> Complexes:

@@ -7,53 +7,51 @@ moment -w F about the middle of the face.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, CycleFunctions, Family, Spectra
-from exugear.steady.mean_system.mesh_waves import MeshWaves
+from exugear.steady.mean_system.mesh_waves import CycleQuantity, MeshWaves
 from fe_ste.tools.arrays import Complexes, Floats
 
 
+@dataclass(frozen=True, eq=False)
 class MeshCycles:
-    """Harmonics over the mesh cycle of what all m mesh components have.
+    """Harmonics over the mesh cycle of what all m mesh components have."""
 
-    Parameters
-    ----------
-    kinds : families of the components
-    harmonics : highest one of each mesh frequency
-    forces : number of forces, and of readings, of each component
-    shuttles : whether moments by misalignment are among them
-    """
-
-    def __init__(
-        self, waves: MeshWaves, kinds: tuple[Family, ...], harmonics: int, forces: int, shuttles: bool
-    ) -> None:
-        self.waves, self.families, self.harmonics = waves, kinds, harmonics
-        self.forces, self.shuttles = forces, shuttles
+    waves: MeshWaves
+    families: tuple[Family, ...]
+    harmonics: int
+    """Highest one of each mesh frequency."""
+    forces: int
+    """Number of forces, and of readings, of each component."""
+    shuttles: bool
+    """Whether moments by misalignment are among them."""
 
     def functions(self, spectra: Spectra) -> CycleFunctions:
         """Functions of the mesh cycles by their harmonics, as `HarmonicCoupling` takes them at a speed."""
         return CycleFunctions(self.waves, self.families, spectra, self.forces)
 
+    def _harmonics_of(self, *quantities: CycleQuantity) -> Complexes:
+        """Fourier coefficients (m, harmonics + 1) of a product of quantities over the mesh cycle."""
+        return self.waves.cycle_coefficients(*quantities, harmonics=self.harmonics)
+
     @cached_property
     def stiffness(self) -> Complexes:
         """Fourier coefficients (m, harmonics + 1) of the stiffness over the mesh cycle, N/m; of curves the tangent."""
-        return self.waves.cycle_coefficients("tangent", harmonics=self.harmonics)
+        return self._harmonics_of("tangent")
 
     @cached_property
     def compliances(self) -> Complexes:
         """Fourier coefficients (m, harmonics + 1) of the static transmission error over the static load, m/N."""
-        return self.waves.cycle_coefficients("compliance", harmonics=self.harmonics)
+        return self._harmonics_of("compliance")
 
     @cached_property
     def curves(self) -> tuple[Complexes, Complexes]:
         """Fourier coefficients (m, harmonics + 1) of load over deflection (N/m), and of the exponents less one."""
-        waves = self.waves
-        harmonics = self.harmonics
-        secant = waves.cycle_coefficients("secant", harmonics=harmonics)
-        return secant, waves.cycle_coefficients("exponent", harmonics=harmonics)
+        return self._harmonics_of("secant"), self._harmonics_of("exponent")
 
     @cached_property
     def pulls(self) -> Complexes:
@@ -63,24 +61,18 @@ class MeshCycles:
     @cached_property
     def ways(self) -> Complexes:
         """Fourier coefficients (m, harmonics + 1) of the axial shift of the load, m."""
-        return self.waves.cycle_coefficients("way", harmonics=self.harmonics)
+        return self._harmonics_of("way")
 
     @cached_property
     def moments_beyond(self) -> Complexes:
         """Fourier coefficients (m, harmonics + 1) of the moment that the static load has beyond that way, N m."""
-        return self.waves.cycle_coefficients("moment", harmonics=self.harmonics)
+        return self._harmonics_of("moment")
 
     @cached_property
     def moments(self) -> tuple[Complexes, Complexes, Complexes]:
         """Fourier coefficients (m, harmonics + 1) of that way times stiffness (N), pull (N m), and squared (N m)."""
-        waves = self.waves
-        harmonics = self.harmonics
-        pulls = self.waves.loads[:, None] * waves.cycle_coefficients("exponent", "way", harmonics=harmonics)
-        return (
-            waves.cycle_coefficients("tangent", "way", harmonics=harmonics),
-            pulls,
-            waves.cycle_coefficients("tangent", "way", "way", harmonics=harmonics),
-        )
+        pulls = self.waves.loads[:, None] * self._harmonics_of("exponent", "way")
+        return self._harmonics_of("tangent", "way"), pulls, self._harmonics_of("tangent", "way", "way")
 
     @cached_property
     def tangents(self) -> dict[tuple[int, int], Complexes]:
@@ -122,13 +114,12 @@ class MeshCycles:
 
         A curve of load over deflection is the load times the power m of deflection over that at this load.
         """
-        waves = self.waves
-        bend = waves.cycle_coefficients("exponent", "tangent", "secant", harmonics=self.harmonics)
-        slope = waves.cycle_coefficients("exponent", "tangent", harmonics=self.harmonics)
-        curved = waves.loads[:, None] > 0.0
-        bend = np.where(curved, bend / np.where(curved, waves.loads[:, None], 1.0), 0.0)
+        loads = self.waves.loads[:, None]
+        curved = loads > 0.0
+        bend = self._harmonics_of("exponent", "tangent", "secant") / np.where(curved, loads, 1.0)
+        slope = self._harmonics_of("exponent", "tangent")
         key = DEFLECTION, DEFLECTION
-        return self.functions({key: bend}), self.functions({key: np.where(curved, -slope, 0.0)})
+        return self.functions({key: np.where(curved, bend, 0.0)}), self.functions({key: np.where(curved, -slope, 0.0)})
 
     @property
     def _derivative(self) -> Complexes:
@@ -140,19 +131,14 @@ class MeshCycles:
         """Forces of tangents at zero deflection over the mesh cycle: of curves, and moments where loads shuttle."""
         spectra = {(DEFLECTION, DEFLECTION): -self.pulls}
         if self.shuttles:
-            spectra[MISALIGNMENT, DEFLECTION] = self._moments_given
+            pulls = self.moments[1] - self.moments_beyond
+            spectra[MISALIGNMENT, DEFLECTION] = pulls - _constant(pulls, self.varying_tilting[:, 2])
         return self.functions(spectra)
 
     @cached_property
     def varying_tilting(self) -> Floats:
         """`MeshWaves.tilting` of each wave's mesh (m, 3)."""
         return np.asarray(self.waves.tilting[[wave.first for wave in self.waves.waves]])
-
-    @cached_property
-    def _moments_given(self) -> Complexes:
-        """Fourier coefficients (m, harmonics + 1) of the moments that the meshes have without deflection, N m."""
-        pulls = self.moments[1] - self.moments_beyond
-        return np.asarray(pulls - _constant(pulls, self.varying_tilting[:, 2]))
 
 
 def _constant(cycle: Complexes, values: Floats) -> Complexes:

@@ -8,7 +8,6 @@ a few speeds with many neighbours show which of them are needed.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 
@@ -68,18 +67,18 @@ def with_needed_neighbours(
 
 def _vibrations(model: HarmonicBalanceModel, speeds: Floats, prepared: Steps | None) -> list[Complexes]:
     """Vibration at each of the speeds (rad/s), two at a time."""
+
+    def vibration(speed: float) -> Complexes:
+        """Overall transmission error and deflections of the meshes (n, 1 + m), m."""
+        response = parametric_response(model, model.at(speed))
+        return np.column_stack([response.motion @ model.row_of_overall(speed), response.deflection])
+
     found: list[Complexes] = []
     while len(found) < len(speeds):
-        found += side_by_side(partial(_vibration, model), speeds[len(found) : len(found) + 2].tolist())
+        found += side_by_side(vibration, speeds[len(found) : len(found) + 2].tolist())
         if prepared is not None:
             prepared(f"choice of {len(model.lines.index)} orders", len(found), len(speeds))
     return found
-
-
-def _vibration(model: HarmonicBalanceModel, speed: float) -> Complexes:
-    """Overall transmission error and deflections of the meshes (n, 1 + m) at a speed (rad/s), m."""
-    response = parametric_response(model, model.at(speed))
-    return np.column_stack([response.motion @ model.row_of_overall(speed), response.deflection])
 
 
 def _change(found: Complexes, known: Complexes) -> float:

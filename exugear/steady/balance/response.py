@@ -123,10 +123,10 @@ def linear_response(model: HarmonicBalanceModel, interface: Interface) -> Respon
     """
     excess = transmission_errors(model, interface.ports, interface.speed)
     excess[..., DEFLECTION] += mean_deviation_forces(model, interface.speed)
-    answer = _answer(interface, excess)[..., DEFLECTION]
-    for _ in range(BEARINGS_REPEATED if model.shaft_orders.bearings else 0):
-        interface = with_unequal_bearings(model, interface, _motion(interface, excess.reshape(len(excess), -1)))
     forces = excess.reshape(len(excess), -1)
+    answer = -np.einsum("nij,nj->ni", interface.deflection_per_force, forces).reshape(excess.shape)[..., DEFLECTION]
+    for _ in range(BEARINGS_REPEATED if model.shaft_orders.bearings else 0):
+        interface = with_unequal_bearings(model, interface, _motion(interface, forces))
     return _response(model, interface, interface.static[..., DEFLECTION] + answer, forces, 0)
 
 
@@ -276,7 +276,9 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
     repeated = bool(model.shaft_orders.sidebands or model.varying)
     balance = LineBalance(model, interface, answers, lengths)
     passing = balance.passing
-    of_bearings = _static_bearing_forces(model, interface.speed)
+    of_bearings = np.zeros((shape[0], 0), dtype=complex)
+    if model.varying_bearings is not None:
+        of_bearings = model.varying_bearings.still_at(model.lines, model.varying[0].carrier, interface.speed)
     given = given_forces(model, interface) + deviation_forces(model, interface, passing)
     moved = np.zeros_like(given)
     slow = SlowChanges(model, interface) if repeated else None
@@ -290,8 +292,12 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
         products += more
         excess = whole + balance.forces(found)
         deflection = (found / lengths)[:, :of_meshes].reshape(shape)[..., DEFLECTION]
-        if before is not None and not model.varying and _is_settled(found, before):
-            break
+        if before is not None and not model.varying:
+            # Forces by moving positions are products of deflections and positions: a relative change c of both changes
+            # them by 2 c, and these forces have themselves changed the solution by c.
+            change = float(np.linalg.norm(found - before) / np.linalg.norm(found))
+            if 2.0 * change**2 < TOLERANCE:
+                break
         if again and slow is not None:
             moved = slow.forces(deflection, _motion(interface, excess))
         if again and model.shaft_orders.bearings:
@@ -318,24 +324,6 @@ def _still(interface: Interface, shape: tuple[int, ...], coordinates: Integers, 
         moved = np.zeros((shape[0], len(coordinates))) if loads is None else loads.motion[:, coordinates]
         found = np.hstack([found, moved])
     return lengths * found
-
-
-def _static_bearing_forces(model: HarmonicBalanceModel, speed: float) -> Complexes:
-    """Find forces (n, c) in the static state of the bearings that vary with the carrier."""
-    bearings = model.varying_bearings
-    if bearings is None:
-        return np.zeros((len(model.lines.index), 0), dtype=complex)
-    return bearings.still_at(model.lines, model.varying[0].carrier, speed)
-
-
-def _is_settled(found: Complexes, before: Complexes) -> bool:
-    """Return whether positions that move with a solution would change it by less than the residual.
-
-    Their forces are products of deflections and positions: a relative change c of both changes them by 2 c, and these
-    forces have themselves changed the solution by c.
-    """
-    change = float(np.linalg.norm(found - before) / np.linalg.norm(found))
-    return 2.0 * change**2 < TOLERANCE
 
 
 class LineBalance:
@@ -418,13 +406,6 @@ def given_forces(model: HarmonicBalanceModel, interface: Interface) -> Complexes
     if model.shuttles:
         products[0, :, MISALIGNMENT] += model.cycles.varying_tilting[:, 2] * [wave.wave == 0 for wave in waves.waves]
     return products
-
-
-def _answer(interface: Interface, excess: Complexes) -> Complexes:
-    """Find the readings -G F (n, m, f) that laws along a row push along, under their forces (n, m, f)."""
-    if excess.shape[2] == 1:
-        return np.asarray(-np.einsum("nij,nj->ni", interface.deflection[..., 0], excess[..., 0]))[..., None]
-    return np.asarray(-(interface.deflection_per_force @ excess.reshape(len(excess), -1, 1))).reshape(excess.shape)
 
 
 def _response(

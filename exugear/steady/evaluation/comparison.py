@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from exugear.gearbox.units import RPM
 from exugear.results.order_tracking.angle_cuts import BANDWIDTH, STEPS, angle_cuts
 from exugear.results.spectra.waterfall import OrderLine
 from exugear.steady.evaluation.run_up import MeasuredChannel, MeasuredRunUp
@@ -457,8 +456,3 @@ def resolution_text(run_up: MeasuredRunUp) -> str:
         f"Hann window over {run_up.window.revolutions:g} revolutions of {run_up.speed_shaft}, bandwidth "
         f"{bandwidth:.3g} orders of the input"
     )
-
-
-def speed_range(run_up: MeasuredRunUp) -> tuple[float, float]:
-    """Lowest and highest speed of the input in a run-up, rpm."""
-    return float(run_up.shaft.speed.min()) / RPM, float(run_up.shaft.speed.max()) / RPM

@@ -9,12 +9,15 @@ parameters does not show that they are determined; the width of the interval doe
 
 from __future__ import annotations
 
+import difflib
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.sections.entries import quantities
 from fe_ste.tools.arrays import Booleans, Floats
 from fe_ste.tools.display import ReprMixin, TitledRows
 
@@ -36,6 +39,8 @@ STEP = 0.01
 ACCURACY = 0.02
 """Accuracy of computed levels, dB: interpolation, windows, sweep. No interval is narrower than this permits."""
 PROBABILITY = 0.95
+FITTED_TABLES = ("bearings", "couplings", "damping", "housing", "mounts")
+"""Tables of the gearbox file on which no table of transmission errors and no reduced body depends."""
 
 Levels = Callable[[Mapping[str, float]], Floats]
 """Function that computes levels (channels, lines, windows), dB, from values of parameters."""
@@ -94,6 +99,39 @@ class ParameterFit(ReprMixin):
     def _table(self) -> TitledRows:
         rows = {own.key: f"{own.value:.4g} ({own.low:.4g} to {own.high:.4g})" for own in self.parameters}
         return "Fitted parameters", rows
+
+
+def start_of_fit(gearbox: Gearbox, keys: Sequence[str]) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
+    """Values and possible ranges of keys of the gearbox file, such as ``housing.factor``.
+
+    Raises
+    ------
+    GearboxFileError
+        There are too many keys, or one has no single number above zero that can be fitted.
+
+    Examples
+    --------
+    >>> start_of_fit(Gearbox.from_toml("cases/grc750/gearbox.toml"), ["damping.modal_percent"])[1]
+    {'damping.modal_percent': (0.01, 20.0)}
+    """
+    if not 1 <= len(set(keys)) <= MOST_PARAMETERS or len(set(keys)) < len(keys):
+        raise gearbox.error(
+            f"fit of {', '.join(keys) or 'nothing'}: one to {MOST_PARAMETERS} different keys can be fitted"
+        )
+    known = {
+        key: (value, (limits.least, limits.most))
+        for key, value, limits in quantities(gearbox.case)
+        if key.split(".")[0] in FITTED_TABLES and value > 0.0 and not key.rpartition(".")[2].isdigit()
+    }
+    for key in keys:
+        if key not in known:
+            near = difflib.get_close_matches(key, known, 1)
+            tables = ", ".join(f"[{table}]" for table in FITTED_TABLES)
+            remedy = (
+                f"did you mean {near[0]!r}?" if near else f"single numbers of {tables} that it states can be fitted"
+            )
+            raise gearbox.error(f"fit of {key}: the file has no such number above zero; {remedy}")
+    return {key: known[key][0] for key in keys}, {key: known[key][1] for key in keys}
 
 
 def fit_levels(

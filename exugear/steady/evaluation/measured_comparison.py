@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -29,20 +29,7 @@ from exugear.steady.evaluation.comparison import (
     resolution_text,
     resonance_shift,
 )
-from exugear.steady.evaluation.mistakes import (
-    band_findings,
-    coverage_finding,
-    drift_finding,
-    foreign_finding,
-    jump_finding,
-    level_findings,
-    load_finding,
-    measured_foreign_orders,
-    recording_findings,
-    shift_finding,
-    spectrum_of,
-    speed_finding,
-)
+from exugear.steady.evaluation.mistakes import noticed_mistakes
 from exugear.steady.evaluation.run_up import MeasuredRunUp
 from exugear.steady.steady_file import settings_of
 from fe_ste.tools.arrays import SingleComplexes
@@ -223,13 +210,23 @@ class MeasuredComparison(ReprMixin):
         """
         Store(path, self.input_hash).write_dataset(self._dataset())
         cuts = write_table(path.with_name(f"{path.stem}-cuts.csv"), CUT_HEADINGS, self._cut_rows())
-        peaks = [[_cell(value) for value in self.peak_summary(peak).values()] for peak in self.peaks]
+        peaks = [["" if value is None else value for value in self.peak_summary(peak).values()] for peak in self.peaks]
         table = write_table(path.with_name(f"{path.stem}-peaks.csv"), PEAK_HEADINGS, peaks)
         foreign = [[own.order, own.amplitude, own.prominence] for own in self.foreign]
         headings = ("order", "amplitude", "above_neighbours_dB")
         others = write_table(path.with_name(f"{path.stem}-foreign.csv"), headings, foreign)
         picture = path.with_suffix(".png")
-        self._draw(picture)
+        count = len(self.cuts.run_up.channels)
+        with drawing_style():
+            figure = new_figure(COLUMN_WIDTHS[2], 1.0 + 2.6 * count)
+            panels = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
+            for channel, panel in enumerate(panels):
+                _draw_channel(panel, self.cuts, channel)
+                panel.legend(ncols=2, fontsize=6.5)
+            panels[-1].set_xlabel("Input speed / rpm")
+            words = f"{resolution_text(self.cuts.run_up)}; amplitudes zero-to-peak"
+            figure.supxlabel(words, fontsize=7.0, color="#555555")
+            finish_figure(figure, picture)
         return path, cuts, table, others, picture
 
     def _cut_rows(self) -> Iterator[list[float | str]]:
@@ -288,21 +285,6 @@ class MeasuredComparison(ReprMixin):
         }
         return xr.Dataset(variables, {key: np.array(own, dtype=object) for key, own in names.items()}, attributes)
 
-    def _draw(self, path: Path) -> None:
-        """Draw all channels below each other."""
-        count = len(self.cuts.run_up.channels)
-        with drawing_style():
-            figure = new_figure(COLUMN_WIDTHS[2], 1.0 + 2.6 * count)
-            panels = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
-            for channel, panel in enumerate(panels):
-                _draw_channel(panel, self.cuts, channel)
-                panel.legend(ncols=2, fontsize=6.5)
-            panels[-1].set_xlabel("Input speed / rpm")
-            figure.supxlabel(
-                f"{resolution_text(self.cuts.run_up)}; amplitudes zero-to-peak", fontsize=7.0, color="#555555"
-            )
-            finish_figure(figure, path)
-
 
 CUT_HEADINGS = (
     "channel",
@@ -341,7 +323,7 @@ def compare_run_up(
     Parameters
     ----------
     response : as of `exugear.steady.steady_file.stored_or_computed`
-    limits : as of `exugear.steady.evaluation.damping.damping_extremes`
+    limits : as of `exugear.steady.evaluation.load_over_speed.damping_extremes`
 
     Raises
     ------
@@ -353,26 +335,14 @@ def compare_run_up(
     cuts = compared_cuts(run_up, response, limits)
     stretch = best_stretch(cuts)
     peaks = paired_peaks(cuts, stretch)
-    spectrum = spectrum_of(run_up)
-    foreign = measured_foreign_orders(gearbox, spectrum)
-    found: Sequence[Iterator[Finding]] = (
-        speed_finding(gearbox, run_up, spectrum),
-        recording_findings(run_up),
-        load_finding(run_up, settings_of(response.attrs).method),
-        band_findings(cuts),
-        drift_finding(cuts),
-        level_findings(cuts),
-        foreign_finding(foreign, run_up),
-        coverage_finding(cuts),
-        shift_finding(resonance_shift(peaks, stretch)),
-        jump_finding(cuts, peaks),
-    )
+    shift = resonance_shift(peaks, stretch)
+    foreign, findings = noticed_mistakes(gearbox, cuts, peaks, shift, settings_of(response.attrs).method)
     return MeasuredComparison(
         cuts=cuts,
         stretch=stretch,
         peaks=peaks,
         foreign=foreign,
-        findings=tuple(finding for part in found for finding in part),
+        findings=findings,
         harmonics=int(response.attrs["harmonics"]),
         input_hash=comparison_hash(run_up.digest, run_up.section, str(response.attrs["input_hash"])),
     )
@@ -439,7 +409,3 @@ def _draw_waterfall(cuts: ComparedCuts, channel: int, ax: Axes | None) -> Axes:
 
 def _known(value: float) -> float | None:
     return value if math.isfinite(value) else None
-
-
-def _cell(value: float | str | None) -> float | str:
-    return "" if value is None else value

@@ -61,19 +61,37 @@ MOST_NAMED = 5
 """Maximum number of foreign orders that a sentence names."""
 
 
-def spectrum_of(run_up: MeasuredRunUp) -> OrderSpectrum | None:
-    """Order spectrum of the channel with the highest order: the one in which orders are clearest."""
-    found = [order_spectrum(values, run_up.shaft, run_up.per) for values in run_up.values]
-    known = [spectrum for spectrum in found if spectrum is not None]
-    return max(known, key=lambda spectrum: float(spectrum.prominence.max()), default=None)
+def noticed_mistakes(
+    gearbox: Gearbox, cuts: ComparedCuts, peaks: Sequence[PeakPair], shift: float, method: Method
+) -> tuple[tuple[OrderInSpectrum, ...], tuple[Finding, ...]]:
+    """Return orders that carry power and belong to no shaft, mesh or sideband of the gearbox, and all findings.
 
-
-def measured_foreign_orders(gearbox: Gearbox, spectrum: OrderSpectrum | None) -> tuple[OrderInSpectrum, ...]:
-    """Orders of a measurement that carry power and belong to no shaft, mesh or sideband of the gearbox."""
-    if spectrum is None:
-        return ()
-    known = gearbox_orders(gearbox, float(spectrum.order[-1]))
-    return foreign_orders(standing_orders(spectrum), known, spectrum.resolution)
+    Parameters
+    ----------
+    shift : computed over measured speed of resonances minus 1
+    method : of the response
+    """
+    run_up = cuts.run_up
+    spectra = [order_spectrum(values, run_up.shaft, run_up.per) for values in run_up.values]
+    known = [spectrum for spectrum in spectra if spectrum is not None]
+    # The channel with the highest order shows orders clearest.
+    spectrum = max(known, key=lambda own: float(own.prominence.max()), default=None)
+    foreign: tuple[OrderInSpectrum, ...] = ()
+    if spectrum is not None:
+        of_gearbox = gearbox_orders(gearbox, float(spectrum.order[-1]))
+        foreign = foreign_orders(standing_orders(spectrum), of_gearbox, spectrum.resolution)
+    return foreign, (
+        *speed_finding(gearbox, run_up, spectrum),
+        *recording_findings(run_up),
+        *load_finding(run_up, method),
+        *band_findings(cuts),
+        *drift_finding(cuts),
+        *level_findings(cuts),
+        *foreign_finding(foreign),
+        *coverage_finding(cuts),
+        *shift_finding(shift),
+        *jump_finding(cuts, peaks),
+    )
 
 
 def recording_findings(run_up: MeasuredRunUp) -> Iterator[Finding]:
@@ -200,6 +218,7 @@ def level_findings(cuts: ComparedCuts) -> Iterator[Finding]:
             )
             continue
         offset = cuts.offset(number)
+        spread = float(np.median(np.abs(cuts.difference[number][compared] - offset)))
         if channel.quantity == "acceleration" and abs(abs(offset) - GRAVITY_LEVEL) < LEVEL_ERROR:
             written, meant = ("m/s2", "g") if offset > 0.0 else ("g", "m/s2")
             yield Finding(
@@ -215,7 +234,7 @@ def level_findings(cuts: ComparedCuts) -> Iterator[Finding]:
                 f"quantity, place and full scale of {key}",
                 offset,
             )
-        elif _differs_by_root_two(cuts, number):
+        elif abs(abs(offset) - ROOT_TWO_LEVEL) < ROOT_TWO_RANGE and spread < ROOT_TWO_RANGE:
             taken, meant = ("peak", "rms") if offset > 0.0 else ("rms", "peak")
             yield Finding(
                 "note",
@@ -224,14 +243,6 @@ def level_findings(cuts: ComparedCuts) -> Iterator[Finding]:
                 f"damping and stiffness may have the same effect: check the calibration of {key}",
                 offset,
             )
-
-
-def _differs_by_root_two(cuts: ComparedCuts, channel: int) -> bool:
-    """Return whether the levels of a channel differ by one factor near the square root of 2."""
-    difference = cuts.difference[channel][cuts.compared[channel]]
-    offset = cuts.offset(channel)
-    spread = float(np.median(np.abs(difference - offset)))
-    return abs(abs(offset) - ROOT_TWO_LEVEL) < ROOT_TWO_RANGE and spread < ROOT_TWO_RANGE
 
 
 def _slope(cuts: ComparedCuts, channel: int) -> float:
@@ -283,7 +294,7 @@ def jump_finding(cuts: ComparedCuts, peaks: Sequence[PeakPair]) -> Iterator[Find
         )
 
 
-def foreign_finding(orders: Sequence[OrderInSpectrum], run_up: MeasuredRunUp) -> Iterator[Finding]:
+def foreign_finding(orders: Sequence[OrderInSpectrum]) -> Iterator[Finding]:
     """Yield the orders that belong to nothing of the gearbox."""
     if orders:
         shown = ", ".join(f"{own.order:.4g}" for own in orders[:MOST_NAMED])

@@ -209,7 +209,11 @@ def read_run_up(gearbox: Gearbox, name: str | None = None) -> MeasuredRunUp:
     path = recording_path(gearbox, name)
     source = section.tacho or section.speed
     assert source is not None  # checked with the section
-    files = {own: _files_of(own, channel) for own, channel in section.channels.items()}
+    # Names in the file of a channel: its own, or those of its two encoders.
+    files = {
+        own: tuple(encoder.channel for encoder in channel.encoders) if channel.encoders else (channel.channel or own,)
+        for own, channel in section.channels.items()
+    }
     try:
         recording = read_recording(path, list(dict.fromkeys([source.channel, *chain(*files.values())])))
     except RecordingError as error:
@@ -233,7 +237,8 @@ def read_run_up(gearbox: Gearbox, name: str | None = None) -> MeasuredRunUp:
             )
             continue
         recorded = recording.channel(files[own][0])
-        factor = _factor(gearbox, f"{key}.channels.{own}", channel, recorded)
+        factor = _unit(gearbox, f"{key}.channels.{own}", channel.unit, recorded, channel.quantity).factor
+        factor *= 1.0 if channel.full_scale is None else channel.full_scale
         if channel.body is not None:
             torque = MeasuredTorque.of(channel.body, factor * recorded.values[part], shaft.speed)
             continue
@@ -313,31 +318,23 @@ def _shaft_angle(
     gearbox: Gearbox, key: str, section: MeasurementSection, recording: Recording
 ) -> tuple[ShaftAngle, float]:
     """Angle of the shaft with the tacho or speed signal, and its speed over that of the input."""
-    if section.tacho is not None:
-        kind, channel, shaft = "tacho", section.tacho.channel, section.tacho.shaft
-    else:
-        assert section.speed is not None
-        kind, channel, shaft = "speed", section.speed.channel, section.speed.shaft
-    per = abs(gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0).get(shaft, 0.0))
+    source = section.tacho or section.speed
+    assert source is not None  # checked with the section
+    kind = "speed" if section.tacho is None else "tacho"
+    per = abs(gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0).get(source.shaft, 0.0))
     if not per > 0.0:
         raise gearbox.error(
-            f"{key}.{kind}.shaft = {shaft!r}: does not turn with the overall input {gearbox.case.overall.input!r}; "
-            "name a shaft whose speed is in a fixed ratio to it"
+            f"{key}.{kind}.shaft = {source.shaft!r}: does not turn with the overall input "
+            f"{gearbox.case.overall.input!r}; name a shaft whose speed is in a fixed ratio to it"
         )
-    recorded = recording.channel(channel)
+    recorded = recording.channel(source.channel)
     try:
-        if section.tacho is not None:
-            return angle_of_tacho(recorded.values, recording.rate, section.tacho.pulses_per_revolution), per
-        assert section.speed is not None
-        unit = _unit(gearbox, f"{key}.speed", section.speed.unit, recorded, "speed")
+        if isinstance(source, TachoSection):
+            return angle_of_tacho(recorded.values, recording.rate, source.pulses_per_revolution), per
+        unit = _unit(gearbox, f"{key}.speed", source.unit, recorded, "speed")
         return angle_of_speed(unit.factor * recorded.values, recording.rate), per
     except SpeedSignalError as error:
-        raise gearbox.error(f"{key}.{kind}.channel = {channel!r}: {error}") from None
-
-
-def _files_of(name: str, channel: MeasuredChannelSection) -> tuple[str, ...]:
-    """Names in the file of a channel: its own, or those of its two encoders."""
-    return tuple(own.channel for own in channel.encoders) if channel.encoders else (channel.channel or name,)
+        raise gearbox.error(f"{key}.{kind}.channel = {source.channel!r}: {error}") from None
 
 
 def _error_by_encoders(
@@ -380,12 +377,6 @@ def _unit(gearbox: Gearbox, key: str, stated: str | None, recorded: RecordedChan
             f"{examples}"
         )
     return unit
-
-
-def _factor(gearbox: Gearbox, key: str, section: MeasuredChannelSection, recorded: RecordedChannel) -> float:
-    """Factor from the values of a recording to SI."""
-    unit = _unit(gearbox, key, section.unit, recorded, section.quantity)
-    return unit.factor * (1.0 if section.full_scale is None else section.full_scale)
 
 
 def _measured(name: str, section: MeasuredChannelSection) -> MeasuredChannel:

@@ -84,7 +84,6 @@ def trace(
     *,
     step: float,
     longest: float,
-    most: int = MOST_POINTS,
     solve: Solve | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Branch:
@@ -96,7 +95,6 @@ def trace(
     start : orders near a solution at `first`
     first, last : of the parameter
     step, longest : first and longest step along the branch, in scales
-    most : maximum number of points
     solve : callable, optional
         Solution of the linear equations; GMRES by default.
     progress : called with the parameter of each point
@@ -106,7 +104,7 @@ def trace(
     HarmonicBalanceError
         No solution at `first`, or none near the branch with steps a thousandth of the first.
     """
-    solve = solve or _solve_gmres
+    solve = solve or (lambda change, right, tolerance: solve_lines(change, right, tolerance)[0])
     lines = [_solution_at(residual, solve, start, first, scales)]
     parameters = [first]
     sense = np.sign(last - first)
@@ -114,7 +112,7 @@ def trace(
     tangent_lines = np.zeros_like(start)
     tangent_parameter = sense * scales.parameter
     whole = False
-    while not whole and len(parameters) < most:
+    while not whole and len(parameters) < MOST_POINTS:
         ahead = lines[-1] + length * tangent_lines, parameters[-1] + length * tangent_parameter
         found = _corrected(residual, solve, ahead, (tangent_lines, tangent_parameter), scales)
         if found is None:
@@ -139,10 +137,6 @@ def trace(
 
 def _size(values: Complexes) -> float:
     return float(np.linalg.norm(values.ravel()))
-
-
-def _solve_gmres(change: Callable[[Complexes], Complexes], right: Complexes, tolerance: float) -> Complexes:
-    return solve_lines(change, right, tolerance)[0]
 
 
 def _solution_at(residual: Residual, solve: Solve, lines: Complexes, parameter: float, scales: Scales) -> Complexes:
@@ -289,6 +283,11 @@ def standing_peaks(values: Floats, stands: float = STANDS) -> Integers:
     found = np.empty(len(values), dtype=np.int64)
     count = find_standing(np.ascontiguousarray(values, dtype=np.float64), stands, found)
     return found[:count]
+
+
+def peaks_of_lines(sizes: Floats, stands: float = STANDS) -> list[tuple[int, int]]:
+    """Return point and line of the `standing_peaks` of all amplitudes (points, lines), line by line."""
+    return [(int(point), line) for line, own in enumerate(sizes.T) for point in standing_peaks(own, stands)]
 
 
 @compiled

@@ -81,7 +81,12 @@ def solve_lines(
     basis[0] = remainder / size
     for n in range(most):
         w = real(apply(lines(basis[n])))
-        column, w = _orthogonal(w, basis[: n + 1])
+        # Two passes leave a vector that is orthogonal to the basis to round-off.
+        first = basis[: n + 1] @ w
+        w = w - first @ basis[: n + 1]
+        second = basis[: n + 1] @ w
+        w = w - second @ basis[: n + 1]
+        column = (first + second).tolist()
         length = math.sqrt(w @ w)
         for i, (c, s) in enumerate(turns):
             column[i], column[i + 1] = c * column[i] + s * column[i + 1], c * column[i + 1] - s * column[i]
@@ -91,7 +96,10 @@ def solve_lines(
         columns.append(column)
         rest[n:] = turns[n][0] * rest[n], -turns[n][1] * rest[n]
         if abs(rest[n + 1]) <= wanted or length == 0.0:
-            return lines(x + _steps(columns, rest) @ basis[: n + 1]), n + 1
+            triangle = np.zeros((n + 1, n + 1))
+            for i, own in enumerate(columns):
+                triangle[: i + 1, i] = own
+            return lines(x + np.linalg.solve(triangle, rest[: n + 1]) @ basis[: n + 1]), n + 1
         if n + 1 == len(basis):
             basis = np.concatenate([basis, np.empty_like(basis)])
         basis[n + 1] = w / length
@@ -99,22 +107,6 @@ def solve_lines(
         f"harmonic balance: not converged, the residual remains at {abs(rest[most]) / max(size, 1e-300):.1e} of its "
         f"initial value after {most} products"
     )
-
-
-def _orthogonal(w: Floats, basis: Floats) -> tuple[list[float], Floats]:
-    """Shares of a vector along an orthonormal basis, and what is left of it, orthogonal to round-off."""
-    first = basis @ w
-    w = w - first @ basis
-    second = basis @ w
-    return (first + second).tolist(), w - second @ basis
-
-
-def _steps(columns: list[list[float]], rest: list[float]) -> Floats:
-    """Solve the triangular equations of all columns."""
-    triangle = np.zeros((len(columns), len(columns)))
-    for n, column in enumerate(columns):
-        triangle[: n + 1, n] = column
-    return np.asarray(np.linalg.solve(triangle, rest[: len(columns)]))
 
 
 LEFT_OVER = 1e-10

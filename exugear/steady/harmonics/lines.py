@@ -26,6 +26,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+import scipy.linalg
 
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
 from fe_ste.tools.bundles import cached_bundle
@@ -183,15 +184,12 @@ class Modulator:
         """
         if self.passing:
             return self.least_turns(line)
-        multiple = int(line[list(self.of)].sum())
         if not np.any(line[list(self.of)]):
             return (0,)
         if self.step is None or np.count_nonzero(line) == 1:
             return tuple(range(-(self.count // 2), self.count // 2 + 1))
-        turns = (multiple * self.step) % self.count
-        if 2 * turns == self.count:
-            return (0,)
-        return (turns - self.count if 2 * turns > self.count else turns,)
+        least = self.least_turns(line)
+        return least if len(least) == 1 else (0,)
 
 
 def line_set(orders: Sequence[float], harmonics: int, combinations: int = 0) -> LineSet:
@@ -239,7 +237,8 @@ def modulated(lines: LineSet, modulators: Sequence[Modulator], most: int = 0) ->
     orders = np.array([modulator.order for modulator in modulators])
     bases = np.append(lines.bases, orders)
     rows = {(*line.tolist(), *turns) for line in lines.index for turns in _all_turns(line, modulators, most)}
-    return _lines_of_rows(np.array(sorted(rows)), bases, _with_slow(lines.units, len(modulators)))
+    units = scipy.linalg.block_diag(lines.units, np.eye(len(modulators), dtype=np.int64))
+    return _lines_of_rows(np.array(sorted(rows)), bases, units)
 
 
 def _all_turns(line: Integers, modulators: Sequence[Modulator], most: int) -> list[tuple[int, ...]]:
@@ -275,7 +274,7 @@ def beside(lines: LineSet, slow: Sequence[Modulator], most: int) -> LineSet:
         if n
     ]
     rows = np.array([np.append(line, turn) for line in lines.index for turn in turns])
-    return _lines_of_rows(rows, bases, _with_slow(lines.units, len(slow)))
+    return _lines_of_rows(rows, bases, scipy.linalg.block_diag(lines.units, np.eye(len(slow), dtype=np.int64)))
 
 
 @dataclass(frozen=True)
@@ -420,14 +419,6 @@ def _independent(bases: Floats, whole: int = LARGEST_RATIO) -> Integers:
         for n, near in group:
             units[n, column] = int(near * shared) // common
     return units
-
-
-def _with_slow(units: Integers, slow: int) -> Integers:
-    """Multiples of independent frequencies of bases and slow ones behind them, each independent of all others."""
-    found = np.zeros((len(units) + slow, units.shape[1] + slow), dtype=np.int64)
-    found[: len(units), : units.shape[1]] = units
-    found[len(units) :, units.shape[1] :] = np.eye(slow, dtype=np.int64)
-    return found
 
 
 GROWTH = 1.15

@@ -25,7 +25,7 @@ from exugear.system.bearings.stiffness import bearing_rows
 from exugear.system.kernels.connectors import rolling_pushes, rolling_strains
 from exugear.system.kernels.rolling import RollingArrays, selected_rolling
 from exugear.system.system import Assembly
-from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.arrays import Floats
 
 COMPONENTS = 5
 """Readings and forces of a bearing: along x, y, z, and tilts about x and y; of planets' along radius and tangent."""
@@ -113,12 +113,19 @@ class BearingWaves:
     def at(self, speed: float) -> BearingMean:
         """Find the static state of the bearings in the averaged system at a speed of the input, rad/s."""
         frame = self.system.frame
-        numbers = self._numbers
+        numbers = np.concatenate([self.waves[n].connectors for n in self.firsts]).astype(np.int64)  # law by law
         q, v, _ = frame.state(0.0, speed, self.system.static_at(speed))
         t, t1, _ = frame.matrices(0.0)
         chosen = self.assembly.connectors.chosen(numbers)
         ways = np.eye(q.size)
-        turn = self._radial_transformation()
+        sets = [self.waves[n].planets for n in self.firsts]
+        angles = [np.zeros(1) if planets is None else planets.angles for planets in sets]
+        # From components along a bearing's axes to those along radius and tangent of its planet.
+        turn = np.tile(np.eye(COMPONENTS), (len(numbers), 1, 1))
+        for own, angle in zip(turn, np.concatenate(angles), strict=True):
+            c = math.cos(angle)
+            s = math.sin(angle)
+            own[:2, :2] = own[3:, 3:] = [[c, s], [-s, c]]
 
         def slopes(step: float, by_place: float) -> Floats:
             moved = [
@@ -130,30 +137,16 @@ class BearingWaves:
         by_q = slopes(PLACE_STEP, 1.0)
         by_v = slopes(RATE_STEP, 0.0)
         static = (turn @ rolling_strains(q, v, chosen)[..., None])[..., 0]
+        laws = [self.waves[n].law for n in self.firsts for _ in self.waves[n].connectors]
+        loads = [sample_rolling(self.laws, law, strain[None])[0] for law, strain in zip(laws, static, strict=True)]
         return BearingMean(
             readings=self._waves_of(by_q @ t + speed * by_v @ t1),
             rates=self._waves_of(by_v @ t),
             static=self._waves_of(static),
             pushes=self._waves_of(-(turn @ rolling_pushes(q, chosen)) @ t),
-            load=self._waves_of(self._static_loads(static)),
+            load=self._waves_of(np.concatenate(loads)),
             slope=self._mean_slope(self._waves_of(static)),
         )
-
-    @cached_property
-    def _numbers(self) -> Integers:
-        """All bearings (c,), law by law."""
-        return np.concatenate([self.waves[n].connectors for n in self.firsts]).astype(np.int64)
-
-    def _radial_transformation(self) -> Floats:
-        """Matrices (c, 5, 5) from components along a bearing's axes to those along radius and tangent of its planet."""
-        sets = [self.waves[n].planets for n in self.firsts]
-        angles = [np.zeros(1) if planets is None else planets.angles for planets in sets]
-        turn = np.tile(np.eye(COMPONENTS), (len(self._numbers), 1, 1))
-        for own, angle in zip(turn, np.concatenate(angles), strict=True):
-            c = math.cos(angle)
-            s = math.sin(angle)
-            own[:2, :2] = own[3:, 3:] = [[c, s], [-s, c]]
-        return turn
 
     def _waves_of(self, values: Floats) -> Floats:
         """Waves (b, ...) of values (c, ...) at zero angle of the input."""
@@ -174,12 +167,6 @@ class BearingWaves:
         if planets is None:
             return np.ones((len(turned), 1, 1))
         return planets.values(turned)[..., : sum(wave.law == law for wave in self.waves)]
-
-    def _static_loads(self, static: Floats) -> Floats:
-        """Find the forces (c, 5) at readings (c, 5) of the bearings."""
-        laws = [self.waves[n].law for n in self.firsts for _ in self.waves[n].connectors]
-        found = [sample_rolling(self.laws, law, strain[None])[0] for law, strain in zip(laws, static, strict=True)]
-        return np.concatenate(found)
 
     def _mean_slope(self, static: Floats) -> Floats:
         """Return derivatives (b, 5, b, 5) of the forces of components by readings, at the static state (b, 5).

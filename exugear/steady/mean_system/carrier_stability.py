@@ -37,7 +37,10 @@ def growth_over_carrier(system: MeanSystem, speed: float) -> float:
     assert system.over_angle is not None
     places = system.frame.places
     period = float(places[1] * len(places)) / abs(speed)
-    basis = _basis(system, speed)
+    basis = np.eye(system.size)
+    if system.size > LARGEST:
+        stiffness = system.stiffness_at(speed)
+        basis = scipy.linalg.eigh(0.5 * (stiffness + stiffness.T), system.mass, subset_by_index=(0, MODES - 1))[1]
     mass = basis.T @ system.mass @ basis
     dampings, stiffnesses = system.over_angle[0], system.at(system.over_angle[1], speed)
     dampings = basis.T @ (system.damping_at(speed) + dampings - dampings.mean(axis=0)) @ basis
@@ -64,28 +67,16 @@ def exponents_of_turning(
     array([-1., -1.])
     """
     step = abs(period) / STEPS
-    weights = _weights(len(dampings), math.copysign(1.0, period))
+    count = len(dampings)
+    turns = np.fft.fftfreq(count, 1.0 / count)
+    angles = np.outer(math.copysign(1.0, period) * 2.0 * np.pi * (np.arange(STEPS) + 0.5) / STEPS, turns)
+    # Of an even number of angles the highest harmonic is a cosine.
+    phases = np.where(2 * turns == -count, np.cos(angles), np.exp(1j * angles))
+    # Values at the middle of each step are those at even angles with weights (steps, count), by Fourier series.
+    weights = (phases @ np.fft.fft(np.eye(count), axis=0)).real / count
     passage = np.eye(2 * len(mass))
     for own in weights:
         constant = state_matrix(mass, np.tensordot(own, dampings, axes=1), np.tensordot(own, stiffnesses, axes=1))
         passage = scipy.linalg.expm(step * constant) @ passage
     multipliers, shapes = scipy.linalg.eig(passage)
     return np.log(multipliers.astype(np.complex128)) / abs(period), shapes[: len(mass)]
-
-
-def _basis(system: MeanSystem, speed: float) -> Floats:
-    """Find the columns (size, n) that span the motion: all coordinates, or undamped modes of the averaged system."""
-    if system.size <= LARGEST:
-        return np.eye(system.size)
-    stiffness = system.stiffness_at(speed)
-    shapes = scipy.linalg.eigh(0.5 * (stiffness + stiffness.T), system.mass, subset_by_index=(0, MODES - 1))[1]
-    return np.asarray(shapes)
-
-
-def _weights(count: int, sense: float) -> Floats:
-    """Weights (steps, count) of values at even angles for those at the middle of each step, by Fourier series."""
-    turns = np.fft.fftfreq(count, 1.0 / count)
-    angles = np.outer(sense * 2.0 * np.pi * (np.arange(STEPS) + 0.5) / STEPS, turns)
-    # Of an even number of angles the highest harmonic is a cosine.
-    phases = np.where(2 * turns == -count, np.cos(angles), np.exp(1j * angles))
-    return np.asarray((phases @ np.fft.fft(np.eye(count), axis=0)).real / count)

@@ -20,7 +20,7 @@ from exugear.steady.mean_system.planet_sets import PlanetSet
 from exugear.system.kernels.coordinates import BODY_SIZE
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.stiffness import pack
-from fe_ste.tools.arrays import Complexes, Floats
+from fe_ste.tools.arrays import Floats
 
 LEAST = 1e-9
 """Share of a displacement up to which pins that differ by it are displaced alike."""
@@ -35,7 +35,8 @@ def unequal_pins(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> dict[str, F
     """
     found: dict[str, Floats] = {}
     for planets in sets:
-        own = _along_radius(assembly, planets)
+        offsets = [complex(*assembly.gearbox.pin_offsets.get(name, (0.0, 0.0))) for name in planets.names]
+        own = np.array(offsets) * np.exp(-1j * planets.angles)
         beyond = own - own.mean()
         if np.abs(beyond).max() > LEAST * np.abs(own).max():
             turned = beyond * np.exp(1j * planets.angles)
@@ -90,13 +91,6 @@ def pin_places(assembly: Assembly, planets: PlanetSet, turned: float) -> Floats:
             first = assembly.coordinates[name][0]
             found[first : first + PLANE] = np.array([[c, -s], [s, c]]) @ offset
     return found
-
-
-def _along_radius(assembly: Assembly, planets: PlanetSet) -> Complexes:
-    """Offsets (planets,) of the pins, along the radius and, as imaginary part, along the tangent, m."""
-    offsets = assembly.gearbox.pin_offsets
-    found = np.array([complex(*offsets.get(name, (0.0, 0.0))) for name in planets.names])
-    return np.asarray(found * np.exp(-1j * planets.angles))
 
 
 def _at_ends(pinion: str, gear: str, offsets: Mapping[str, Floats]) -> tuple[Floats, Floats]:

@@ -219,21 +219,33 @@ def mean_system(assembly: Assembly, speeds: Floats, prepared: Steps | None = Non
     """
     _check(assembly)
     sets = planet_sets(assembly)
-    assembly, spread = _with_equal_planets(with_equal_pins(assembly, sets), sets)
+    assembly = with_equal_pins(assembly, sets)
+    # Catalogue bearings of planets are equal already: this changes anisotropic matrices of the file.
+    supports = [own for planets in sets for own in planet_supports(assembly.supports, planets.names, planets.angles)]
+    connectors, spread = with_equal_planets(assembly.connectors, supports)
+    assembly = replace(assembly, connectors=connectors)
     frame = rotating_frame(assembly, sets)
-    drive, load = _drive_and_load(assembly)
+    case = assembly.gearbox.case
+    # The degree of freedom locked in the file holds the speed: its torque balances the others.
+    keeper = assembly.gearbox.locked[0] if assembly.gearbox.locked else case.overall.input
+    drive = assembly.torque_vector({keeper: 1.0})
+    load = assembly.torque_vector(case.static_load.torques_N_m)
     low = float(np.min(speeds))
     high = float(np.max(speeds))
     low, high = (low, high) if high > low else (low - 0.5 * abs(low), high + 0.5 * abs(high))
     at = np.array([low, 0.5 * (low + high), high])
-    u = _first_guess(assembly, frame, drive)
+    # The first guess is the static state at standstill, rotated back to zero angle of the input.
+    pinned = assembly.spin[case.overall.input]
+    q = static_state(assembly).q
+    rolling = assembly.rolling_velocity(np.zeros(assembly.size), frame.speeds)
+    u = np.asarray(np.linalg.solve(frame.matrices(0.0)[0], q - q[pinned] * rolling))
     torque = 0.0
     rows = []
     # Where stiffness varies with the carrier the static state balances the mean over its places.
     places = frame.places if frame.varies else np.zeros(1)
     matrix = None
     total = len(at) + (len(frame.places) - 1 if sets else 0)
-    report = partial(prepared or _unreported, "linearisation")
+    report = partial(prepared or (lambda words, done, total: None), "linearisation")
     for speed in at:
         u, torque = _static(frame, places, float(speed), drive, load, u, torque, matrix)
         damping, matrix = tangents(frame, 0.0, float(speed), u)
@@ -252,7 +264,6 @@ def mean_system(assembly: Assembly, speeds: Floats, prepared: Steps | None = Non
         stiffnesses = stiffnesses + changes[2].mean(axis=1)
         if frame.varies:
             over_angle = changes[1], changes[2]
-    pinned = assembly.spin[assembly.gearbox.case.overall.input]
     return MeanSystem(
         frame,
         at,
@@ -263,28 +274,10 @@ def mean_system(assembly: Assembly, speeds: Floats, prepared: Steps | None = Non
         torques,
         drive,
         pinned,
-        spread,
+        max(spread, assembly.planet_spread),
         variation,
         over_angle,
     )
-
-
-def _unreported(words: str, done: int, total: int) -> None:
-    """Report no progress."""
-
-
-def _with_equal_planets(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> tuple[Assembly, float]:
-    """Assembly with equal planet bearings, and the largest relative change of stiffness that this required.
-
-    Catalogue bearings are equal already: the change concerns anisotropic matrices of the file.
-    """
-    supports = [
-        planet_support
-        for planets in sets
-        for planet_support in planet_supports(assembly.supports, planets.names, planets.angles)
-    ]
-    connectors, spread = with_equal_planets(assembly.connectors, supports)
-    return replace(assembly, connectors=connectors), max(spread, assembly.planet_spread)
 
 
 def rotating_frame(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> RotatingFrame:
@@ -417,36 +410,6 @@ def _has_sectors(gearbox: Gearbox, mesh: Mesh) -> bool:
     return seat is not None and seat.sectors is not None
 
 
-def _drive_and_load(assembly: Assembly) -> tuple[Floats, Floats]:
-    """Return the generalized force of a unit of the drive's torque, and those of the static load.
-
-    The degree of freedom locked in the file holds the speed: its torque balances the others.
-    """
-    load = assembly.gearbox.case.static_load
-    overall = assembly.gearbox.case.overall
-    locked = assembly.gearbox.locked
-    keeper = locked[0] if locked else overall.input
-    return assembly.torque_vector({keeper: 1.0}), assembly.torque_vector(load.torques_N_m)
-
-
-def _first_guess(assembly: Assembly, frame: RotatingFrame, drive: Floats) -> Floats:
-    """Find the static state at standstill, rotated back to zero angle of the input, in the coordinates of the frame."""
-    q = static_state(assembly).q
-    rolling = assembly.rolling_velocity(np.zeros(assembly.size), frame.speeds)
-    pinned = assembly.spin[assembly.gearbox.case.overall.input]
-    return np.asarray(np.linalg.solve(frame.matrices(0.0)[0], q - q[pinned] * rolling))
-
-
-def _residual(
-    frame: RotatingFrame, psi: float, speed: float, u: Floats, du: Floats | None = None, ddu: Floats | None = None
-) -> Floats:
-    """Generalized forces (size,) in the frame that inertia needs, less those that elements give."""
-    assembly = frame.assembly
-    q, v, a = frame.state(psi, speed, u, du, ddu)
-    missing = assembly.inertia_forces(q, v, a) - assembly.forces(q, v, frame.mean_meshes)
-    return np.asarray(frame.matrices(psi)[0].T @ missing)
-
-
 def tangents(frame: RotatingFrame, psi: float, speed: float, u: Floats) -> tuple[Floats, Floats]:
     """Damping and stiffness (size, size) in the frame, about the coordinates u at the input's angle psi.
 
@@ -481,7 +444,10 @@ def _mass(frame: RotatingFrame, psi: float, u: Floats) -> Floats:
 
 
 def _residuals(frame: RotatingFrame, psi: float, speed: float, u: Floats, du: Floats | None) -> Floats:
-    """Return `_residual` at several coordinates and velocities (n, size) at once: bearings have much in common."""
+    """Generalized forces (n, size) in the frame that inertia needs, less those that elements give.
+
+    At several coordinates and velocities (n, size) at once: bearings have much in common.
+    """
     assembly = frame.assembly
     t = frame.matrices(psi)[0]
     states = [frame.state(psi, speed, place, None if du is None else du[n]) for n, place in enumerate(u)]
@@ -520,7 +486,7 @@ def _static(
     best = before = np.inf
     bordered = np.zeros((n + 1, n + 1))
     for _ in range(MOST_STEPS):
-        held = np.mean([_residual(frame, float(psi), speed, u) for psi in places], axis=0)
+        held = np.mean([_residuals(frame, float(psi), speed, u[None], None)[0] for psi in places], axis=0)
         missing = held - load - torque * drive
         error = float(np.abs(np.append(missing, largest * u[pinned])).max()) / largest
         if not error < np.inf or (best < BALANCED and error > 0.5 * best):
@@ -568,6 +534,7 @@ def _changes_over_places(
     most = ROWS_VARIATION if frame.assembly.has_rows or curved else VARIATION
     without = frame.without_varying
     still = stiffness[1] if without is frame else _stiffness(without, 0.0, speed, u)
+    size = np.sqrt(np.abs(np.diag(stiffness[1])).clip(min=1e-3 * np.abs(np.diag(stiffness[1])).max()))
     for place, psi in enumerate(places[1:].tolist(), start=1):
         masses[place] = _mass(frame, psi, u) - mass
         dampings[place] = _damping(frame, psi, speed, u) - damping
@@ -579,21 +546,15 @@ def _changes_over_places(
             for n in (0, 2):
                 stiffnesses[n, place] = _stiffness(frame, psi, float(speeds[n]), static[n]) - stiffness[n]
             stiffnesses[1, place] = 0.5 * (stiffnesses[0, place] + stiffnesses[2, place])
-        largest = max(largest, _checked_change(turned - still, stiffness[1], most))
+        change = float(np.abs((turned - still) / np.outer(size, size)).max())
+        if change > most:
+            raise SteadyError(
+                f"the stiffness varies by {100.0 * change:.2g} % over a carrier revolution (unequal planets, or a "
+                "support that rotates with them), which the steady-state response cannot treat; use exugear run instead"
+            )
+        largest = max(largest, change)
         report(place)
     return (masses, dampings, stiffnesses), largest
-
-
-def _checked_change(changes: Floats, stiffness: Floats, most: float) -> float:
-    """Find the change of stiffness with the carrier's angle, over it, and refuse more of it than a share."""
-    size = np.sqrt(np.abs(np.diag(stiffness)).clip(min=1e-3 * np.abs(np.diag(stiffness)).max()))
-    change = float(np.abs(changes / np.outer(size, size)).max())
-    if change > most:
-        raise SteadyError(
-            f"the stiffness varies by {100.0 * change:.2g} % over a carrier revolution (unequal planets, or a support "
-            "that rotates with them), which the steady-state response cannot treat; use exugear run instead"
-        )
-    return change
 
 
 def most_rolling(system: MeanSystem, shapes: Complexes) -> Integers:

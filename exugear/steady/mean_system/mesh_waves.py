@@ -148,7 +148,7 @@ class MeshWaves:
                     abs(planets.ratio),
                     tuple(sorted(bases)),
                     planets.waves,
-                    *_one_of(steps),
+                    next(iter(steps)) if len(steps) == 1 else None,
                     planets.passing if name == self.varying_carrier else 0,
                 ),
             )
@@ -368,8 +368,8 @@ class MeshWaves:
         return out
 
 
-def mesh_waves(system: MeanSystem, passing: int = 0, neighbours: int = NEIGHBOURS) -> MeshWaves:
-    """Mesh components of an averaged system; `passing` and, of a flexible ring gear, `neighbours` as in `MeshWaves`."""
+def mesh_waves(system: MeanSystem, passing: int = 0) -> MeshWaves:
+    """Mesh components of an averaged system; `passing` as in `MeshWaves`."""
     frame = system.frame
     assembly = frame.assembly
     gearbox = assembly.gearbox
@@ -382,6 +382,7 @@ def mesh_waves(system: MeanSystem, passing: int = 0, neighbours: int = NEIGHBOUR
     displaced = displaced_carriers(assembly, frame.sets)
     for meshes, planets in groups:
         mesh = assembly.elements[meshes[0]].mesh
+        turning = frame.speeds.get(mesh.pinion, 0.0) - frame.speeds.get(mesh.frame, 0.0)
         order = frequencies[mesh.name]
         base = next((n for n, known in enumerate(orders) if abs(order - known) < SAME_BASE * known), len(orders))
         if base == len(orders):
@@ -389,7 +390,7 @@ def mesh_waves(system: MeanSystem, passing: int = 0, neighbours: int = NEIGHBOUR
             names.append([])
         if mesh.family not in names[base]:
             names[base].append(mesh.family)
-        sense = math.copysign(1.0, _cycles_per_turn(frame, meshes[0]))
+        sense = math.copysign(1.0, assembly.meshes.cycles[meshes[0]] * turning)
         own = (meshes[0],)
         if planets is None:
             waves.append(MeshWave(mesh.name, mesh.name, *own, 0, 1.0, base, sense, 0.0))
@@ -402,7 +403,7 @@ def mesh_waves(system: MeanSystem, passing: int = 0, neighbours: int = NEIGHBOUR
             label = f"{name} {wave_name(number, planets.waves)}" if number else name
             waves.append(MeshWave(label, mesh.family, *own, number, float(weight), base, sense, planets.ratio, ahead))
     found = MeshWaves(system, tuple(waves), np.array(orders), tuple(", ".join(name) for name in names), passing)
-    return replace(found, neighbours=neighbours) if found.varying_carrier else found
+    return replace(found, neighbours=NEIGHBOURS) if found.varying_carrier else found
 
 
 def mesh_groups(frame: RotatingFrame) -> tuple[tuple[tuple[int, ...], PlanetSet | None], ...]:
@@ -418,23 +419,10 @@ def mesh_groups(frame: RotatingFrame) -> tuple[tuple[tuple[int, ...], PlanetSet 
     out = []
     for meshes, planets in found.values():
         if planets is not None:
-            by_planet = {
-                name: m
-                for m in meshes
-                for name in planets.names
-                if name in (frame.assembly.elements[m].mesh.pinion, frame.assembly.elements[m].mesh.gear)
-            }
-            meshes = tuple(by_planet[name] for name in planets.names)
+            ends = {m: (frame.assembly.elements[m].mesh.pinion, frame.assembly.elements[m].mesh.gear) for m in meshes}
+            meshes = tuple(next(m for m in meshes if name in ends[m]) for name in planets.names)
         out.append((meshes, planets))
     return tuple(out)
-
-
-def _cycles_per_turn(frame: RotatingFrame, mesh: int) -> float:
-    """Mesh cycles per rad of the input, signed."""
-    element = frame.assembly.elements[mesh]
-    speeds = frame.speeds
-    relative = speeds.get(element.mesh.pinion, 0.0) - speeds.get(element.mesh.frame, 0.0)
-    return float(frame.assembly.meshes.cycles[mesh] * relative)
 
 
 def _turns_per_cycle(wave: MeshWave, planets: PlanetSet) -> int | None:
@@ -451,11 +439,6 @@ def _turns_per_cycle(wave: MeshWave, planets: PlanetSet) -> int | None:
     if np.abs((ahead - step * np.arange(count) / count + 0.5) % 1.0 - 0.5).max() > IN_PHASE:
         return None
     return int(-step * wave.sense * math.copysign(1.0, wave.carrier)) % count
-
-
-def _one_of(steps: set[int | None]) -> tuple[int | None]:
-    """Return the common step of all meshes of a carrier, None where they differ."""
-    return (next(iter(steps)),) if len(steps) == 1 else (None,)
 
 
 def _rows(assembly: Assembly, q: Floats, rows: Floats) -> tuple[Floats, Floats]:

@@ -190,28 +190,24 @@ class RotatingFrame:
         for planets, coordinates in self.rings:
             if coordinates[0, 0] < 0:
                 continue
-            turned = self._with_directions(planets, coordinates, psi, turned)
+            # Displacements and tilts turn along radius and tangent of each planet: R w and its derivatives.
+            rate = planets.ratio
+            r, r1, r2 = self._unit()
+            for angle, coordinate in zip(rate * psi + planets.angles, coordinates, strict=True):
+                c = math.cos(angle)
+                s = math.sin(angle)
+                plane = np.array([[c, -s], [s, c]])
+                for first in (0, TILT):
+                    place = np.ix_(coordinate[first : first + 2], coordinate[first : first + 2])
+                    r[place], r1[place] = plane, rate * np.array([[-s, -c], [c, -s]])
+                    r2[place] = -(rate**2) * plane
+            w, w1, w2 = turned
+            turned = r @ w, r1 @ w + r @ w1, r2 @ w + 2.0 * r1 @ w1 + r @ w2
         for carrier in self.carriers:
             modal = self.assembly.elastic_slices[carrier.name].start + carrier.modal
             for matrix, values in zip(turned, carrier.turned(psi), strict=True):
                 matrix[np.ix_(modal, modal)] = values
         return turned
-
-    def _with_directions(self, planets: PlanetSet, coordinates: Integers, psi: float, waves: Jet) -> Jet:
-        """Turn displacements and tilts along radius and tangent of each planet: R w and its derivatives."""
-        turning = self._unit()
-        for angle, coordinate in zip(planets.ratio * psi + planets.angles, coordinates, strict=True):
-            c = math.cos(angle)
-            s = math.sin(angle)
-            rate = planets.ratio
-            plane = np.array([[c, -s], [s, c]])
-            around = rate * np.array([[-s, -c], [c, -s]])
-            for first in (0, TILT):
-                place = np.ix_(coordinate[first : first + 2], coordinate[first : first + 2])
-                for matrix, values in zip(turning, (plane, around, -(rate**2) * plane), strict=True):
-                    matrix[place] = values
-        (r, r1, r2), (w, w1, w2) = turning, waves
-        return r @ w, r1 @ w + r @ w1, r2 @ w + 2.0 * r1 @ w1 + r @ w2
 
     def _rolling(self, psi: float) -> Jet:
         assembly = self.assembly

@@ -42,7 +42,7 @@ from exugear.steady.mean_system.displaced_pins import displaced_carriers, pin_de
 from exugear.steady.mean_system.mesh_waves import MeshWaves
 from exugear.steady.mean_system.planet_sets import PlanetSet
 from exugear.steady.mean_system.standing_loads import reactions
-from exugear.steady.mean_system.unequal_bearings import UnequalBearings, unequal_bearings
+from exugear.steady.mean_system.unequal_bearings import LEAST, UnequalBearings, unequal_bearings
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.system.kernels.meshes import FRAME
 from exugear.system.kernels.turning import travelling_tangent
@@ -62,8 +62,6 @@ REACH = 4
 """Harmonics of each mesh frequency whose sidebands a stated load has at most."""
 ABSENT = 1e-2
 """Share of the variation of a mesh stiffness up to which it counts as without a harmonic, which makes the sidebands."""
-LEAST = 1e-9
-"""Share of the largest coefficient below which one is zero but for round-off."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,16 +276,17 @@ class _Series:
                 orders = self._orders(mesh, end)
                 if not orders:
                     continue
-                body, teeth = self._wheel(mesh, end)
-                frame = self.assembly.elements[mesh].mesh.frame
+                own_mesh = self.assembly.elements[mesh].mesh
+                body = (own_mesh.pinion, own_mesh.gear)[end]
+                teeth = (own_mesh.pair.pinion, own_mesh.pair.gear)[end].teeth
                 turning = self._turning(mesh, end, planets, place, len(own))
                 for (order, value), (turn, shape, row) in itertools.product(orders, turning):
                     if order == 0 and turn < 0:
                         continue  # the conjugate of that which turns the other way
                     # Whole mesh cycles count as such. Orders beside one number of them are sidebands of one kind.
                     whole = round(order / teeth)
-                    nearest = self._key(body, frame, planets, order - teeth * whole, turn)
-                    whole *= int(math.copysign(1.0, self._relative(body, frame)))
+                    nearest = self._key(body, own_mesh.frame, planets, order - teeth * whole, turn)
+                    whole *= int(math.copysign(1.0, self._relative(body, own_mesh.frame)))
                     key = tuple(sorted((*nearest, (self.cycles[base], whole)))) if whole else nearest
                     displaced = np.zeros(len(waves), dtype=complex)
                     displaced[own] = value * shape
@@ -323,24 +322,19 @@ class _Series:
             self._add(self.reaction, (DEVIATION, key), self._no_reaction)
             self._add(self.shift, (DEVIATION, key), shift[turn])
             self._add(self.centrifugal, (DEVIATION, key), pushed[turn])
-        self._add_bearings(planets, most)
+        # What bearings that are not equal have beyond their mean in the static state.
+        if (unequal := unequal_bearings(self.assembly, self.waves.system, planets)) is not None:
+            self.bearings.append(unequal)
+            for turn, still in zip(unequal.turns.tolist(), unequal.still, strict=True):
+                if 0 <= turn <= most:
+                    bearing_forces = self._no_reaction
+                    bearing_forces[unequal.coordinates] = still
+                    self._add(self.reaction, (DEVIATION, self._turns(planets, turn)), bearing_forces)
         # The lateral vibration of central bodies passes the planets' differences: that adds a turn of the carrier.
         for turn in range(1, most + 2):
             key = self._turns(planets, turn)
             self.beside += [(key, None, None)] if turn <= most else []
             self.beside += [(key, base, reach) for base, reach in enumerate(self._reaches) if reach]
-
-    def _add_bearings(self, planets: PlanetSet, most: int) -> None:
-        """Add what bearings that are not equal have beyond their mean in the static state, up to a turn of the set."""
-        unequal = unequal_bearings(self.assembly, self.waves.system, planets)
-        if unequal is None:
-            return
-        self.bearings.append(unequal)
-        for turn, still in zip(unequal.turns.tolist(), unequal.still, strict=True):
-            if 0 <= turn <= most:
-                pushed = self._no_reaction
-                pushed[unequal.coordinates] = still
-                self._add(self.reaction, (DEVIATION, self._turns(planets, turn)), pushed)
 
     def _pin_motion(self, planets: PlanetSet, most: int) -> tuple[Complexes, Complexes]:
         """Places that unequal pins give to planets (t, size) in the rotating frame, by multiples of the carrier's turn.
@@ -467,12 +461,6 @@ class _Series:
             on_planet=np.array([any(load.body in own.names for own in self.frame.sets) for load in loads], dtype=bool),
             error_pieces=self.assembly.meshes.error_pieces,
         )
-
-    def _wheel(self, mesh: int, end: int) -> tuple[str, int]:
-        """Body and number of teeth of a gear of a mesh."""
-        own = self.assembly.elements[mesh].mesh
-        gear = (own.pair.pinion, own.pair.gear)[end]
-        return (own.pinion, own.gear)[end], gear.teeth
 
     def _orders(self, mesh: int, end: int) -> list[tuple[int, complex]]:
         """Orders of a gear's deviation and their coefficients at zero angle of the input, m."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exugear.steady.mean_system.mean_system import MeanSystem, place_step
+from exugear.steady.mean_system.mean_system import RATE_STEP, MeanSystem, place_step
 from exugear.steady.mean_system.mesh_waves import MeshWaves, wave_name
 from exugear.steady.mean_system.planet_sets import PlanetSet
 from exugear.steady.mean_system.standing_loads import (
@@ -33,8 +33,6 @@ from fe_ste.tools.arrays import Complexes, Floats, Integers, SingleComplexes
 
 AXES = ("x", "y", "z")
 PLANET_AXES = ("radial", "tangential", "z")
-RATE_STEP = 1e-3
-"""Step of central differences by rates."""
 
 
 @dataclass(frozen=True)
@@ -111,11 +109,14 @@ def signal_rows(system: MeanSystem, speed: float) -> SignalRows:
     frame = system.frame
     assembly = system.frame.assembly
     t, t1, t2 = frame.matrices(0.0)
-    overall = overall_row(assembly)
-    names = [SignalName("overall_dte", "overall_dte", "m")]
-    place = [overall @ t]
-    rate = [np.zeros(assembly.size)]
-    acceleration = [np.zeros(assembly.size)]
+    none = np.zeros(assembly.size)
+    found: list[tuple[SignalName, Floats, Floats, Floats]] = []
+
+    def add(names: Sequence[SignalName], *parts: Floats) -> None:
+        """Add rows by place, rate and acceleration, (names, size) or the same for all."""
+        found.extend(zip(names, *(np.broadcast_to(own, (len(names), assembly.size)) for own in parts), strict=True))
+
+    add([SignalName("overall_dte", "overall_dte", "m")], overall_row(assembly) @ t, none, none)
     if assembly.supports:
         turn, labels = support_waves(assembly, frame.sets)
         # Bearings of planets that are not alike count by their mean here; `varying_bearings` has the rest.
@@ -123,31 +124,24 @@ def signal_rows(system: MeanSystem, speed: float) -> SignalRows:
         by_place, by_rate = np.mean([_load_rows(system, speed, float(psi)) for psi in places], axis=0)
         count = 3 * len(assembly.supports)
         seats = turn @ _seat_rows(assembly)
-        for quantity, units in (("support_force", "N"), ("seat_acceleration", "m/s2")):
-            names += [SignalName(f"{quantity} {label}", quantity, units) for label in labels]
-        place += [*by_place[:count], *(speed**2 * seats @ t2)]
-        rate += [*by_rate[:count], *(2.0 * speed * seats @ t1)]
-        acceleration += [*np.zeros_like(by_place[:count]), *(seats @ t)]
+        forces = [SignalName(f"support_force {label}", "support_force", "N") for label in labels]
+        add(forces, by_place[:count], by_rate[:count], none)
+        accelerations = [SignalName(f"seat_acceleration {label}", "seat_acceleration", "m/s2") for label in labels]
+        add(accelerations, speed**2 * seats @ t2, 2.0 * speed * seats @ t1, seats @ t)
         standing = moment_supports(assembly)
-        names += [
+        moments = [
             SignalName(f"{SUPPORT_MOMENT} {assembly.supports[n].name} {axis}", SUPPORT_MOMENT, "N m")
             for n in standing
             for axis in AXES
         ]
         of_standing = (count + 3 * standing[:, None] + np.arange(3)).ravel()
-        place += [*by_place[of_standing]]
-        rate += [*by_rate[of_standing]]
-        acceleration += [*np.zeros_like(by_place[of_standing])]
+        add(moments, by_place[of_standing], by_rate[of_standing], none)
     twisting, winding = coupling_rows(assembly)
-    names += [_part(COUPLING_TORQUE, name) for name in assembly.spring_names]
-    place += [*(twisting @ t)]
-    rate += [*(winding @ t)]
+    add([_part(COUPLING_TORQUE, name) for name in assembly.spring_names], twisting @ t, winding @ t, none)
     turning = turning_bodies(assembly.gearbox, assembly.spin)
-    names += [_part(BODY_SPEED, name) for name in turning]
-    place += [np.zeros(assembly.size)] * len(turning)
-    rate += [*t[[assembly.spin[name] for name in turning]]]
-    acceleration += [np.zeros(assembly.size)] * (len(twisting) + len(turning))
-    return SignalRows(tuple(names), np.array(place), np.array(rate), np.array(acceleration))
+    add([_part(BODY_SPEED, name) for name in turning], none, t[[assembly.spin[name] for name in turning]], none)
+    names, place, rate, acceleration = zip(*found, strict=True)
+    return SignalRows(names, np.array(place), np.array(rate), np.array(acceleration))
 
 
 def _part(signal: SignalName, name: str) -> SignalName:

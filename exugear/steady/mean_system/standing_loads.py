@@ -15,7 +15,7 @@ import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import node_position
-from exugear.steady.mean_system.mesh_waves import MeshWaves, mesh_groups
+from exugear.steady.mean_system.mesh_waves import MeshWaves
 from exugear.steady.mean_system.rotating_frame import RotatingFrame
 from exugear.system.kernels.coordinates import BODY_SIZE, TILT
 from exugear.system.kernels.meshes import TILT_LEVER
@@ -47,7 +47,7 @@ def standing_gears(frame: RotatingFrame) -> tuple[str, ...]:
         gear: None
         for mesh, element in enumerate(assembly.elements)
         for body, gear in _ends(element)
-        if _stands(assembly, body) and not frame.varies_at(mesh)
+        if assembly.gearbox.body(body).fixed and not frame.varies_at(mesh)
     }
     return tuple(found)
 
@@ -88,7 +88,7 @@ def gear_load_rows(waves: MeshWaves) -> tuple[Floats, Floats, Floats]:
     assembly = waves.assembly
     gears = standing_gears(waves.system.frame)
     along, turning, *sliding = np.zeros((2 + FRICTION_PARTS, len(waves.waves), BODY_SIZE * len(gears)))
-    groups = {meshes[0]: (meshes, planets) for meshes, planets in mesh_groups(waves.system.frame)}
+    groups = {meshes[0]: (meshes, planets) for meshes, planets in waves.groups}
     for number, wave in enumerate(waves.waves):
         meshes, planets = groups[wave.first]
         shapes = np.ones((1, 1)) if planets is None else planets.shapes(0.0)[0]
@@ -102,7 +102,7 @@ def gear_load_rows(waves: MeshWaves) -> tuple[Floats, Floats, Floats]:
             friction = zip(sliding, -element.friction_rows, strict=True)
             for part, rows in ((along, force), (turning, element.misalignment), *friction):
                 for (body, gear), row in zip(_ends(element), rows.reshape(2, BODY_SIZE), strict=True):
-                    if gear in gears and _stands(assembly, body):
+                    if gear in gears and assembly.gearbox.body(body).fixed:
                         first = BODY_SIZE * gears.index(gear)
                         part[number, first : first + BODY_SIZE] -= share * _about_gear(assembly, body, gear, row)
     return along, turning, np.stack(sliding, axis=1)
@@ -112,10 +112,6 @@ def _ends(element: MeshElement) -> tuple[tuple[str, str], tuple[str, str]]:
     """Body and gear of both ends of a mesh."""
     mesh = element.mesh
     return (mesh.pinion, mesh.pair.pinion.name), (mesh.gear, mesh.pair.gear.name)
-
-
-def _stands(assembly: Assembly, body: str) -> bool:
-    return assembly.gearbox.body(body).fixed
 
 
 def _about_gear(assembly: Assembly, name: str, gear: str, row: Floats) -> Floats:

@@ -102,11 +102,8 @@ def symmetric_carrier(name: str, body: ReducedBody, planets: PlanetSet, axis: Se
         # The turn is taken with whole wave numbers, as the frame has them.
         whole = scipy.linalg.block_diag(turn, modes @ exact @ modes.T @ mass)
     matrices = [_mean_over_turns(matrix, whole, planets.waves) for matrix in (body.mass, body.stiffness)]
-    changes = [
-        float(np.linalg.norm(new - old) / np.linalg.norm(old))
-        for new, old in zip(matrices, (body.mass, body.stiffness), strict=True)
-    ]
-    spread = max(changes)
+    both = zip(matrices, (body.mass, body.stiffness), strict=True)
+    spread = max(float(np.linalg.norm(new - old) / np.linalg.norm(old)) for new, old in both)
     if spread > MAX_SPREAD:
         raise SteadyError(
             f"bodies.{name}: its mass and stiffness change by {100.0 * spread:.2g} % under a turn by one planet, but "

@@ -25,7 +25,7 @@ from exugear.steady.mean_system.signals import support_waves
 from exugear.system.kernels.connectors import ConnectorArrays, add_connector_forces, connector_loads
 from exugear.system.kernels.coordinates import BODY_SIZE
 from exugear.system.system import Assembly
-from fe_ste.tools.arrays import Complexes, Floats, Integers
+from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
 
 LEAST = 1e-9
 """Share of the largest coefficient of a series below which one is zero but for round-off."""
@@ -75,14 +75,19 @@ class UnequalBearings:
         found[:, self.sense * self.turns + most] = -self.stiffness, -self.damping
         return (found[0], found[1]) if speed > 0.0 else (found[0].conj(), found[1].conj())
 
-    def still_at(self, lines: LineSet, carrier: int, speed: float) -> Complexes:
-        """Find forces (n, c) of the static state at lines, in that sense; `carrier` is its place among the bases."""
+    def _places(self, lines: LineSet, carrier: int) -> tuple[Integers, Integers, Booleans]:
+        """Multiples of the bases (t, bases) at the carrier's turns, and the lines of those (t,) that are among them."""
         shift = np.zeros((len(self.turns), lines.index.shape[1]), dtype=np.int64)
         shift[:, carrier] = self.sense * self.turns
         places, mirrored = lines.find(shift)
         there = (places >= 0) & ~mirrored
+        return shift, places[there], there
+
+    def still_at(self, lines: LineSet, carrier: int, speed: float) -> Complexes:
+        """Find forces (n, c) of the static state at lines, in that sense; `carrier` is its place among the bases."""
+        _, places, there = self._places(lines, carrier)
         found = np.zeros((len(lines.index), len(self.coordinates)), dtype=complex)
-        np.add.at(found, places[there], -self.still[there])
+        np.add.at(found, places, -self.still[there])
         return found if speed > 0.0 else found.conj()
 
     def at(self, lines: LineSet, carrier: int, speed: float, motion: Complexes) -> tuple[Complexes, Complexes]:
@@ -94,8 +99,7 @@ class UnequalBearings:
         speed : of the input, rad/s
         motion : (n, size) about the static state
         """
-        shift = np.zeros((len(self.turns), lines.index.shape[1]), dtype=np.int64)
-        shift[:, carrier] = self.sense * self.turns
+        shift, places_still, there = self._places(lines, carrier)
         rows = lines.index - shift[:, None, :]
         places, mirrored = lines.find(rows)
         moving = motion[places][..., self.coordinates] * (places >= 0)[..., None]
@@ -109,10 +113,8 @@ class UnequalBearings:
         forces = np.zeros_like(motion)
         forces[:, self.coordinates] = of(self.stiffness, self.damping)
         signals = of(self.signals_stiffness, self.signals_damping)
-        places, mirrored = lines.find(shift)
-        there = (places >= 0) & ~mirrored
         still = self.signals_still if speed > 0.0 else self.signals_still.conj()
-        np.add.at(signals, places[there], still[there])
+        np.add.at(signals, places_still, still[there])
         forces[0], signals[0] = forces[0].real, signals[0].real
         return forces, signals
 

@@ -8,47 +8,28 @@ from exugear.gearbox.gearbox import Gearbox
 
 from .spur import SPUR_CASE
 
-BEARINGS = """
-[bearings.ball]
-body = "shaft_1"
-z_mm = -30.0
-[bearings.ball.catalogue]
-type = "deep_groove_ball"
-bore_mm = 25.0
-outer_diameter_mm = 52.0
-width_mm = 15.0
 
-[bearings.roller]
-body = "shaft_1"
-z_mm = 45.0
-[bearings.roller.catalogue]
-type = "cylindrical_roller"
-bore_mm = 25.0
-outer_diameter_mm = 52.0
-width_mm = 15.0
+def _on_shaft(name: str, body: str, z: float, kind: str, sizes: tuple[float, float, float], more: str = "") -> str:
+    bore, outer, width = sizes
+    return f"""
+[bearings.{name}]
+body = "{body}"
+z_mm = {z}
+[bearings.{name}.catalogue]
+type = "{kind}"
+bore_mm = {bore}
+outer_diameter_mm = {outer}
+width_mm = {width}
+{more}"""
 
-[bearings.taper_1]
-body = "shaft_2"
-z_mm = -30.0
-[bearings.taper_1.catalogue]
-type = "tapered_roller"
-bore_mm = 30.0
-outer_diameter_mm = 62.0
-width_mm = 17.25
-contact_angle_deg = 14.0
-locates_towards = "-z"
 
-[bearings.taper_2]
-body = "shaft_2"
-z_mm = 45.0
-[bearings.taper_2.catalogue]
-type = "tapered_roller"
-bore_mm = 30.0
-outer_diameter_mm = 62.0
-width_mm = 17.25
-contact_angle_deg = 14.0
-locates_towards = "+z"
-"""
+TAPER = ("tapered_roller", (30.0, 62.0, 17.25))
+BEARINGS = (
+    _on_shaft("ball", "shaft_1", -30.0, "deep_groove_ball", (25.0, 52.0, 15.0))
+    + _on_shaft("roller", "shaft_1", 45.0, "cylindrical_roller", (25.0, 52.0, 15.0))
+    + _on_shaft("taper_1", "shaft_2", -30.0, *TAPER, 'contact_angle_deg = 14.0\nlocates_towards = "-z"\n')
+    + _on_shaft("taper_2", "shaft_2", 45.0, *TAPER, 'contact_angle_deg = 14.0\nlocates_towards = "+z"\n')
+)
 before, after = SPUR_CASE.index("[bearings.bearing_1]"), SPUR_CASE.index("[meshes]")
 BEARING_CASE = SPUR_CASE[:before] + BEARINGS + "\n" + SPUR_CASE[after:]
 NAMES = ("ball", "roller", "taper_1", "taper_2")

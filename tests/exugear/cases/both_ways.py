@@ -48,6 +48,22 @@ def exudyn_states(
     return states[:, 0], states[:, 1]
 
 
+def assert_both_solvers_move_alike(
+    assembly: Assembly,
+    q: np.ndarray,
+    v: np.ndarray,
+    without: Assembly | None = None,
+    step: float = 2e-6,
+    most: float = 1e-6,
+) -> None:
+    """60 steps of a spur pair under its static load, by both solvers; an assembly without the excitation differs."""
+    load = {"shaft_1": 100.0, "shaft_2": 150.0}
+    ours, exudyns = (states(assembly, q, v, load, 60, step)[0] for states in (compiled_states, exudyn_states))
+    np.testing.assert_allclose(ours - q, exudyns - q, rtol=0.0, atol=most * np.abs(ours - q).max(axis=0).min())
+    if without is not None:
+        assert np.abs(compiled_states(without, q, v, load, 60, step)[0] - ours).max() > 1e-9
+
+
 def errors_and_mesh_forces(assembly: Assembly) -> slice:
     """Columns of the transmission errors, overall and of the meshes, and of the forces of the meshes."""
     layout = signal_layout(assembly)

@@ -40,26 +40,27 @@ def write_plate(file: Path) -> None:
     )
 
 
-def box_content(folder: Path) -> dict[str, Any]:
-    """Content of the gearbox file in `folder`, where its plate is written."""
-    pytest.importorskip("meshio", reason="meshio (extra mesh) is missing")
-    write_plate(folder / "plate.vtu")
+def boxed(band: float, **solid: Any) -> dict[str, Any]:
+    """The spur pair in the plate, whose seats are the bearings and a foot."""
     content = tomllib.loads(SPUR_CASE)
     face = {"diameter_mm": 72.0, "inner_diameter_mm": 0.0}
+    seats = {"bearing_1": face, "bearing_2": face, "foot": {**face, "position_mm": [50.0, 0.0, -THICKNESS]}}
     content["bodies"]["box"] = {
         "fixed": True,
         "axis_position_mm": [0.0, 0.0],
         "flexibility": "elastic",
-        "solid": {
-            "file": "plate.vtu",
-            "band_Hz": 8000.0,
-            "seats": {"bearing_1": face, "bearing_2": face, "foot": {**face, "position_mm": [50.0, 0.0, -THICKNESS]}},
-        },
+        "solid": {"file": "plate.vtu", "band_Hz": band, **solid, "seats": seats},
     }
     for bearing in content["bearings"].values():
         bearing["on"] = "box"
     stiffness = {"radial_N_per_m": 5e7, "axial_N_per_m": 5e7, "tilt_N_m_per_rad": 1e5, "torsion_N_m_per_rad": 1e5}
     # The foot stands below its seat: the support works on an arm.
     content["mounts"] = {"foot": {"body": "box", "position_mm": [50.0, 0.0, -40.0], "stiffness": stiffness}}
-    content["elasticity"] = {"band_Hz": 8000.0, "limit_Hz": 12000.0}
     return content
+
+
+def box_content(folder: Path) -> dict[str, Any]:
+    """Content of the gearbox file in `folder`, where its plate is written."""
+    pytest.importorskip("meshio", reason="meshio (extra mesh) is missing")
+    write_plate(folder / "plate.vtu")
+    return boxed(8000.0) | {"elasticity": {"band_Hz": 8000.0, "limit_Hz": 12000.0}}

@@ -22,7 +22,7 @@ from exugear.gearbox.sections.entries import Range
 from exugear.system.bodies.matrix_files.files import file_contents
 
 from .beams import beams_between
-from .box import write_plate
+from .box import boxed, write_plate
 from .spur import SPUR_CASE
 
 GRC = Path(__file__).parents[3] / "cases" / "grc750"
@@ -179,23 +179,7 @@ def shaped_shafts() -> dict[str, Any]:
 
 
 def _with_box() -> dict[str, Any]:
-    case = tomllib.loads(SPUR_CASE)
-    face = {"diameter_mm": 72.0, "inner_diameter_mm": 0.0}
-    case["bodies"]["box"] = {
-        "fixed": True,
-        "axis_position_mm": [0.0, 0.0],
-        "flexibility": "elastic",
-        "solid": {
-            "file": "plate.vtu", "band_Hz": 4000.0, "length_unit_mm": 1.0, "element_size_mm": 5.0,
-            "elements_around": 12, "loss_factor": 0.02,
-            "seats": {"bearing_1": face, "bearing_2": face, "foot": {**face, "position_mm": [50.0, 0.0, -12.0]}},
-        },
-    }  # fmt: skip
-    for bearing in case["bearings"].values():
-        bearing["on"] = "box"
-    held = {"radial_N_per_m": 5e7, "axial_N_per_m": 5e7, "tilt_N_m_per_rad": 1e5, "torsion_N_m_per_rad": 1e5}
-    case["mounts"] = {"foot": {"body": "box", "position_mm": [50.0, 0.0, -40.0], "stiffness": held}}
-    return case
+    return boxed(4000.0, length_unit_mm=1.0, element_size_mm=5.0, elements_around=12, loss_factor=0.02)
 
 
 def _with_matrices(folder: Path) -> dict[str, Any]:

@@ -24,14 +24,19 @@ def write_rim(file: Path, oval: float = 0.0) -> None:
 
     With `oval` (m) it is that much thinner at two opposite places, so that its stiffness differs around it.
     """
-    meshio = pytest.importorskip("meshio", reason="meshio (extra mesh) is missing")
     logical = skfem.MeshHex.init_tensor(
         np.array([INNER, OUTER]), np.arange(AROUND + 1.0), np.linspace(-FACE / 2.0, FACE / 2.0, 3)
     )
     radius, number, z = logical.p
     angle = 2.0 * np.pi * number / AROUND
     radius = radius + np.where(radius < OUTER, oval * np.cos(angle) ** 2, 0.0)
-    points = np.stack([radius * np.cos(angle), radius * np.sin(angle), z + MIDDLE], axis=1)
+    _write_around(file, logical, radius, angle, z + MIDDLE)
+
+
+def _write_around(file: Path, logical: Any, radius: np.ndarray, angle: np.ndarray, z: np.ndarray) -> None:
+    """Bricks of a logical mesh at cylindrical coordinates (m and rad), closed around the axis."""
+    meshio = pytest.importorskip("meshio", reason="meshio (extra mesh) is missing")
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
     _, first, joined = np.unique(np.round(points, 9), axis=0, return_index=True, return_inverse=True)
     cells = joined.ravel()[logical.t.T[:, np.argsort([6, 2, 5, 7, 1, 3, 4, 0])]]  # order of VTK
     meshio.Mesh(1e3 * points[first], [("hexahedron", cells)]).write(file)
@@ -91,17 +96,12 @@ def ring_content(grc: Gearbox, folder: Path) -> dict[str, Any]:
 
 def write_drum(file: Path) -> None:
     """Carrier as a thick ring of flat-sided bricks, equal under a turn by 15 degrees, with faces at all bearings."""
-    meshio = pytest.importorskip("meshio", reason="meshio (extra mesh) is missing")
     around = 24
     logical = skfem.MeshHex.init_tensor(
         np.array([0.04, 0.12, 0.2, 0.308, 0.42]), np.arange(around + 1.0), np.array([-0.31, -0.1545, -0.0545, 0.0975])
     )
     radius, number, z = logical.p
-    angle = 2.0 * np.pi * number / around
-    points = np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
-    _, first, joined = np.unique(np.round(points, 9), axis=0, return_index=True, return_inverse=True)
-    cells = joined.ravel()[logical.t.T[:, np.argsort([6, 2, 5, 7, 1, 3, 4, 0])]]  # order of VTK
-    meshio.Mesh(1e3 * points[first], [("hexahedron", cells)]).write(file)
+    _write_around(file, logical, radius, 2.0 * np.pi * number / around, z)
 
 
 def drum_content(grc: Gearbox, folder: Path) -> dict[str, Any]:

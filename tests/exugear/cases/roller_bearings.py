@@ -40,29 +40,16 @@ class CylindricalRollerBearing:
 
 
 @dataclass(frozen=True, kw_only=True)
-class TaperedRollerBearing:
-    """Single-row tapered roller bearing from its boundary dimensions.
+class TaperedRollerBearing(CylindricalRollerBearing):
+    """Single-row tapered roller bearing from its boundary dimensions d, D, T.
 
     The pressure line is taken at the one contact angle that catalogues state (outer raceway); the rib is
     left out. Used alone, the bearing holds an inner ring that is pushed towards +z; turn it by a negative
     `contact_angle` or combine two in a `BearingPair`.
     """
 
-    bore: float
-    outside_diameter: float
-    width: float
-    """Boundary dimensions d, D, T, m."""
     contact_angle: float
     """Nominal contact angle, rad, signed as in `RollerRow`."""
-    full_complement: bool = False
-    element_diameter: float | None = None
-    effective_length: float | None = None
-    element_count: int | None = None
-    """As in `CylindricalRollerBearing`."""
-    radial_clearance: float = 0.0
-    profile_factor: float | None = None
-    laminae: int = LAMINAE
-    """As in `CylindricalRollerBearing`."""
 
     @property
     def rows(self) -> tuple[RollerRow, ...]:
@@ -74,7 +61,7 @@ class TaperedRollerBearing:
 class BearingPair:
     """Two equal bearings next to each other on one shaft and in one housing, as one bearing."""
 
-    bearing: CylindricalRollerBearing | TaperedRollerBearing
+    bearing: CylindricalRollerBearing
     """One of the two."""
     arrangement: Literal["X", "O", "tandem"]
     """X (face to face): pressure lines meet the axis towards the middle of the pair. O (back to back): away from it,
@@ -93,7 +80,7 @@ class BearingPair:
         return pair_rows(row, self.arrangement, distance, self.axial_preload)
 
 
-def _row_from_catalogue(kind: str, bearing: CylindricalRollerBearing | TaperedRollerBearing, angle: float) -> RollerRow:
+def _row_from_catalogue(kind: str, bearing: CylindricalRollerBearing, angle: float) -> RollerRow:
     """Fill what the catalogue leaves open with the usual proportions of the type."""
     usual = PROPORTIONS[kind]
     pitch_diameter = 0.5 * (bearing.bore + bearing.outside_diameter)

@@ -3,19 +3,74 @@
 from __future__ import annotations
 
 import math
+import tomllib
 
 import numpy as np
 
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.steady.balance.nonlinear import HarmonicResidual
 from exugear.steady.balance.response import signals
 from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
+from exugear.system.build import assemble
 from exugear.system.loads import LoadTable
 from exugear.transient.compiled.solver import CompiledSystem, Observer
+
+from .spur import SPUR_CASE
+from .table import surface_of
+
+CYCLE = 2.0 * np.pi * np.arange(50) / 50
+SHAPE = 1.0 + 0.08 * np.cos(CYCLE) + 0.03 * np.sin(2 * CYCLE)
+"""Mesh stiffness over the mesh cycle, relative to its mean."""
+FOUR = {"bodies.planet.planet_angles_deg": [0.0, 90.0, 180.0, 270.0]}
+"""Four planets in place of the three of the GRC, each a quarter of a cycle ahead of the one before."""
+
+
+def line_at(model, order):
+    """Place of the line nearest to an order."""
+    return int(np.argmin(np.abs(model.lines.orders - order)))
 
 
 def solver_of(assembly, speeds, level, harmonics=10, combinations=3):
     model = harmonic_balance_model(assembly, np.array(speeds), harmonics, combinations)
     return PointSolver(model, level)
+
+
+def loose_pair(torque=100.0, variation=3.0, **sections):
+    """Spur pair by a table whose teeth are 0.03 mm thinner and may part, and its solver by the method `nonlinear`."""
+    case = tomllib.loads(SPUR_CASE) | sections
+    case["static_load"]["torques_N_m"]["shaft_1"] = torque
+    case["damping"] = {"mesh_time_s": 4e-6, "bearing_time_s": 4e-6}
+    for gear in case["gears"].values():
+        gear["tooth_thinning_mm"] = 0.03
+    gearbox = Gearbox.from_dict(case)
+    surface = surface_of(gearbox, "spur", variation=variation, stiffness=3e8)
+    assembly = assemble(gearbox, Choice("bushing", "table"), {"spur": surface})
+    return assembly, solver_of(assembly, (50.0, 2000.0), "nonlinear")
+
+
+def error_of_tangents(solver, speed, step, of_bearings=False):
+    """Difference of the tangents of a balance from those by differences of its forces, over their size.
+
+    The state is random lines of 10 nm about the static one, the step (m) others. Of bearings, whose tilts count as
+    lengths, or of meshes, where 10 nm are 10 nrad.
+    """
+    balance = HarmonicResidual(solver.model, solver.model.at(speed), solver.sampling)
+    random = np.random.default_rng(0)
+
+    def some(size):
+        values = random.normal(size=(2, *balance.static.shape))
+        lines = size * (values[0] + 1j * values[1]) / (solver.model.lengths if of_bearings else 1.0)
+        lines[0] = lines[0].real
+        return lines
+
+    state, change = balance.static + some(1e-8), some(step)
+    own = np.s_[:, balance.meshes if of_bearings else 0 :]
+    ahead, behind = (balance.forces(state + sign * change)[0][own] for sign in (1.0, -1.0))
+    found = balance.forces(state)[1](change)[own]
+    assert np.abs(found).max() > 0.0
+    return np.linalg.norm(0.5 * (ahead - behind) - found) / np.linalg.norm(found)
 
 
 def torque_of_vibration(system: MeanSystem, speed: float, frequencies: np.ndarray, motion: np.ndarray) -> float:
@@ -119,14 +174,20 @@ def column_of(observer, name):
     return column
 
 
-def whole_run(model, response, duration, step, torque, assembly=None):
-    """Instants, all signals, and angle of the input of a run in time that starts on a response; its observer."""
+def start_of(model, response):
+    """Coordinates and velocities of a response at zero angle of the input."""
     interface = response.interface
     system, motion = model.system, response.motion + model.pin_places(interface.speed)
-    assembly = assembly or model.waves.assembly
     w = interface.frequencies[1:, None]
     u = system.static_at(interface.speed) + motion[0].real + 2.0 * motion[1:].sum(axis=0).real
-    q, v, _ = system.frame.state(0.0, interface.speed, u, 2.0 * (1j * w * motion[1:]).sum(axis=0).real)
+    return system.frame.state(0.0, interface.speed, u, 2.0 * (1j * w * motion[1:]).sum(axis=0).real)[:2]
+
+
+def whole_run(model, response, duration, step, torque, assembly=None):
+    """Instants, all signals, and angle of the input of a run in time that starts on a response; its observer."""
+    system = model.system
+    assembly = assembly or model.waves.assembly
+    q, v = start_of(model, response)
     load = assembly.gearbox.case.static_load
     loads = LoadTable({**load.torques_N_m, load.locked[0]: torque}, varying=assembly.varying_loads)
     run = CompiledSystem(assembly, q, v, loads, step)

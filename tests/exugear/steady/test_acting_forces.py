@@ -10,7 +10,7 @@ from exugear.steady.balance.acting_forces import acting_forces
 from exugear.steady.settings import Method
 from exugear.system.build import assemble
 
-from ..cases.steady_runs import solver_of
+from ..cases.steady_runs import FOUR, solver_of
 
 RIPPLES = {
     "fast": {"body": "hss", "orders": [12, 31], "torque_N_m": [200.0, 100.0]},
@@ -26,7 +26,7 @@ RUN_OUT = {"wheel": {"body": "hss", "runout_um": 20.0}}
     [
         {"excitations": RIPPLES},
         {"excitations": RIPPLES, "deviations": RUN_OUT},
-        {"excitations": ON_PLANET, "bodies.planet.planet_angles_deg": [0.0, 90.0, 180.0, 270.0]},
+        {"excitations": ON_PLANET, **FOUR},
     ],
     ids=["ripples", "ripples and run-out", "planets out of phase"],
 )

@@ -41,7 +41,7 @@ def response(along: list[float], across: float = 0.0) -> xr.Dataset:
 
 def test_the_share_is_that_of_the_load_along_its_own_direction() -> None:
     (swing,) = bearing_swings(response([100.0, 250.0, 160.0], across=900.0))
-    assert (swing.bearing, swing.count, swing.speed) == ("left", 2, 20.0)
+    assert (swing.name, swing.count, swing.speed) == ("left", 2, 20.0)
     assert swing.share == pytest.approx(0.5)
 
 

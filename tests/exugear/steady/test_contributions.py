@@ -52,13 +52,12 @@ def test_a_peak_is_loudest_where_it_is_said_to_be(model, peak):
     assert here > max(beside)
 
 
-def amplitude_with(other, model, peak):
-    """Amplitude of the line with the mean system of another model, the excitation staying as it is."""
+def amplitude_with(system, excited, model, peak):
+    """Amplitude of the line with an averaged system and the excitation of a model; else as of the unchanged model."""
     speed, line = peak
-    interface = model.at(speed)
-    loads = model.loads(interface.ports) @ transmission_errors(model, interface.ports, interface.speed)[line, :, 0]
-    dynamic = other.system.dynamic(speed, speed * model.lines.orders[line])
-    return abs(model.row_of_overall(speed) @ np.linalg.solve(dynamic, loads))
+    forces = transmission_errors(excited, excited.ports_at(speed), speed)[line, :, 0]
+    dynamic = system.dynamic(speed, speed * model.lines.orders[line])
+    return abs(model.row_of_overall(speed) @ np.linalg.solve(dynamic, model.loads(model.ports_at(speed)) @ forces))
 
 
 def slope(more, less, step):
@@ -81,7 +80,7 @@ def test_the_derivative_by_a_bearing_is_that_of_a_gearbox_with_a_stiffer_one(mod
         changed = replace(
             assembly, connectors=arrays._replace(stiffness=factor * arrays.stiffness, damping=factor * arrays.damping)
         )
-        amplitudes.append(amplitude_with(harmonic_balance_model(changed, RANGE), model, peak))
+        amplitudes.append(amplitude_with(harmonic_balance_model(changed, RANGE).system, model, model, peak))
     assert derivative[family] == pytest.approx(slope(*amplitudes, STEP), rel=0.02, abs=0.02)
 
 
@@ -95,24 +94,19 @@ def test_the_derivative_by_inertia_is_that_of_a_gearbox_with_a_heavier_body(grc,
     for sign in (1.0, -1.0):
         changes = {f"bodies.{family}.inertia.assemblies.{key}": (1.0 + sign * STEP) * section[key] for key in keys}
         other = harmonic_balance_model(assemble(grc.varied(changes), Choice("bushing"), stiffness), RANGE)
-        amplitudes.append(amplitude_with(other, model, peak))
+        amplitudes.append(amplitude_with(other.system, model, model, peak))
     derivative = contributions(model, *peak).bodies[family]
     assert derivative == pytest.approx(slope(*amplitudes, STEP), rel=0.02, abs=0.02)
 
 
 def test_the_derivative_by_a_mesh_error_is_its_share(grc, stiffness, model, peak):
     """What varies of one pair's compliance a little more and less: its transmission error, with the mean kept."""
-    speed, line = peak
-    shares = contributions(model, speed, line).meshes
+    shares = contributions(model, *peak).meshes
     family = max(shares, key=lambda name: abs(shares[name]))
     amplitudes = []
     for sign in (1.0, -1.0):
         compliance = 1.0 / stiffness[family]
         own = 1.0 / (compliance.mean() + (1.0 + sign * STEP) * (compliance - compliance.mean()))
         other = harmonic_balance_model(assemble(grc, Choice("bushing"), {**stiffness, family: own}), RANGE)
-        forces = transmission_errors(other, other.ports_at(speed), speed)[line, :, 0]
-        interface = model.at(speed)
-        dynamic = model.system.dynamic(speed, speed * model.lines.orders[line])
-        loads = model.loads(interface.ports) @ forces
-        amplitudes.append(abs(model.row_of_overall(speed) @ np.linalg.solve(dynamic, loads)))
+        amplitudes.append(amplitude_with(model.system, other, model, peak))
     assert shares[family] == pytest.approx(slope(*amplitudes, STEP), rel=0.02)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from pathlib import Path
 
 import numpy as np
@@ -17,15 +16,15 @@ from fe_ste.transmission_error.compliance import pair_compliance
 from fe_ste.transmission_error.states import StateAxes
 from fe_ste.transmission_error.transmission_error import solve_positions
 
+from ..cases.command import script
+
 BENCHMARKS = Path(__file__).parents[3] / "benchmarks"
 pytestmark = pytest.mark.validation
 
 
 @pytest.fixture(scope="module")
 def defaults():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(BENCHMARKS))
-        return importlib.import_module("defaults")
+    return script(BENCHMARKS, "defaults")
 
 
 @pytest.fixture(scope="module")

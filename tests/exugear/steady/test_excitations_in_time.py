@@ -25,8 +25,7 @@ from ..cases import gear_trains
 from ..cases import table as table_case
 from ..cases.assembled import assembled
 from ..cases.bearing import BEARING_CASE, NON_LINEAR
-from ..cases.spur import SPUR_CASE
-from ..cases.steady_runs import fitted, solver_of
+from ..cases.steady_runs import fitted, loose_pair, solver_of
 from ..conftest import CASE
 
 CYCLE = 2.0 * np.pi * np.arange(50) / 50
@@ -71,15 +70,22 @@ def differences(
     return own, float(np.linalg.norm(lines - known)) / size, float(np.linalg.norm(abs(lines) - abs(known))) / size
 
 
-@pytest.mark.parametrize("speed", [150.0, 204.8, -225.1])
+@pytest.mark.parametrize(
+    ("ripple", "speed", "order", "most"),
+    [
+        *((RIPPLE, speed, 12.0, 5e-4) for speed in (150.0, 204.8, -225.1)),
+        *((MACHINE, w, 24.0, 1e-3) for w in (58.18, 90.0)),
+    ],
+)
 @pytest.mark.parametrize("method", ["parametric", "nonlinear"])
-def test_a_ripple_on_two_stages_stays_on_its_steady_state_on_and_off_resonances(method, speed):
-    """RK4 at 1/80 kHz. On the resonance at 225.1 rad/s the order has 85 um, 25 times as much as off it."""
-    assembly = parallel(RIPPLE)
+def test_a_ripple_on_two_stages_stays_on_its_steady_state_on_and_off_resonances(method, ripple, speed, order, most):
+    """RK4 at 1/80 kHz. On the resonance at 225.1 rad/s the order has 85 um, 25 times as much as off it.
+
+    The electric drive has orders 24 and 48 of a rotor on a coupling; its order 48 meets a mode at 58.18 rad/s.
+    """
+    assembly = parallel(ripple)
     solver = solver_of(assembly, sorted((0.5 * speed, 1.4 * speed)), method, 8)
-    own, every, _ = differences(assembly, solver, speed, 12.0, 0.6, 1.0 / 80e3)
-    assert own < 5e-4
-    assert every < 1e-3
+    np.testing.assert_array_less(differences(assembly, solver, speed, order, 0.6, 1.0 / 80e3)[:2], (most, 1e-3))
 
 
 @pytest.mark.validation
@@ -88,20 +94,7 @@ def test_a_ripple_on_two_stages_with_tables_stays_on_its_steady_state(speed):
     """Method `nonlinear`, law `table`: RK4 at 1/120 kHz."""
     assembly = parallel(RIPPLE, "table")
     solver = solver_of(assembly, (100.0, 300.0), "nonlinear", 8)
-    own, every, _ = differences(assembly, solver, speed, 12.0, 0.6, 1.0 / 120e3)
-    assert own < 1e-4
-    assert every < 2e-4
-
-
-@pytest.mark.parametrize("speed", [58.18, 90.0])
-@pytest.mark.parametrize("method", ["parametric", "nonlinear"])
-def test_an_electric_drive_stays_on_its_steady_state(method, speed):
-    """Orders 24 and 48 of a rotor on a coupling; its order 48 meets a mode at 58.18 rad/s."""
-    assembly = parallel(MACHINE)
-    solver = solver_of(assembly, (50.0, 150.0), method, 8)
-    own, every, _ = differences(assembly, solver, speed, 24.0, 0.6, 1.0 / 80e3)
-    assert own < 1e-3
-    assert every < 1e-3
+    np.testing.assert_array_less(differences(assembly, solver, speed, 12.0, 0.6, 1.0 / 120e3)[:2], (1e-4, 2e-4))
 
 
 @pytest.mark.parametrize("name", ["coupling_torque shaft", "body_speed rotor", "body_speed output"])
@@ -128,9 +121,7 @@ def test_the_ripple_of_a_generator_stays_on_its_steady_state(grc, stiffness, spe
     assembly = assemble(grc.varied({"excitations": {"ripple": ripple}}), Choice("bushing"), stiffness)
     solver = solver_of(assembly, (0.6 * speed, 1.5 * speed), "parametric", 8)
     order = 12.0 * abs(solver.model.system.frame.speeds["hss"])
-    own, every, _ = differences(assembly, solver, speed, order, duration, step)
-    assert own < 1e-3
-    assert every < 1e-3
+    np.testing.assert_array_less(differences(assembly, solver, speed, order, duration, step)[:2], (1e-3, 1e-3))
 
 
 @pytest.mark.validation
@@ -140,22 +131,12 @@ def test_the_ripple_of_a_generator_on_flexible_shafts_stays_on_its_steady_state(
     assembly = assembled(grc_shafts.varied({"excitations": {"ripple": ripple}}), Choice("flexible"), stiffness)
     solver = solver_of(assembly, (2.4, 6.0), "parametric", 8)
     order = 12.0 * abs(solver.model.system.frame.speeds["hss"])
-    own, every, _ = differences(assembly, solver, 4.0, order, 0.4, 1.0 / 100e3)
-    assert own < 1e-3
-    assert every < 1e-3
+    np.testing.assert_array_less(differences(assembly, solver, 4.0, order, 0.4, 1.0 / 100e3)[:2], (1e-3, 1e-3))
 
 
-def pair(ripple: dict[str, Any], torque: float = 100.0, variation: float = 1.0) -> tuple[Assembly, PointSolver]:
+def pair(ripple: dict[str, Any], variation: float = 1.0) -> tuple[Assembly, PointSolver]:
     """Pair with a table and a torque over the angle of a shaft, and its solver by the method `nonlinear`."""
-    case = tomllib.loads(SPUR_CASE) | {"excitations": {"ripple": {"body": "shaft_1"} | ripple}}
-    case["static_load"]["torques_N_m"]["shaft_1"] = torque
-    case["damping"] = {"mesh_time_s": 4e-6, "bearing_time_s": 4e-6}
-    for gear in case["gears"].values():
-        gear["tooth_thinning_mm"] = 0.03
-    gearbox = Gearbox.from_dict(case)
-    surface = table_case.surface_of(gearbox, "spur", variation=variation, stiffness=3e8)
-    assembly = assemble(gearbox, Choice("bushing", "table"), {"spur": surface})
-    return assembly, solver_of(assembly, (50.0, 2000.0), "nonlinear")
+    return loose_pair(variation=variation, excitations={"ripple": {"body": "shaft_1"} | ripple})
 
 
 @pytest.mark.parametrize(
@@ -174,10 +155,7 @@ def test_torques_turn_with_the_vibration_of_their_body_in_the_nonlinear_method(r
     mesh; orders 6 and 9 of shaft 2 are 4 and 6 of shaft 1, which is 1.5 times as fast.
     """
     assembly, solver = pair(ripple)
-    own, every, amplitudes = differences(assembly, solver, speed, order, 0.6, 1.0 / 240e3)
-    assert own < 1e-3
-    assert every < 3e-4
-    assert amplitudes < 1e-4
+    np.testing.assert_array_less(differences(assembly, solver, speed, order, 0.6, 1.0 / 240e3), (1e-3, 3e-4, 1e-4))
 
 
 def test_teeth_that_part_under_a_ripple_stay_on_their_steady_state():
@@ -186,12 +164,11 @@ def test_teeth_that_part_under_a_ripple_stay_on_their_steady_state():
     resonance = float(solver.model.system.eigenvalues(100.0).imag.max()) / 20.0
     for share in np.arange(1.16, 0.97, -0.04):
         solver.response(share * resonance)
-    own, every, amplitudes = differences(assembly, solver, 0.96 * resonance, 12.0, 0.1, 1.0 / 1e6)
+    np.testing.assert_array_less(
+        differences(assembly, solver, 0.96 * resonance, 12.0, 0.1, 1.0 / 1e6), (1e-3, 2e-3, 1e-3)
+    )
     assert solver.state is not None
     assert solver.state.response.apart[0] > 0.2
-    assert own < 1e-3
-    assert every < 2e-3
-    assert amplitudes < 1e-3
 
 
 @pytest.mark.validation
@@ -232,10 +209,7 @@ def test_a_torque_on_the_sun_of_a_planetary_stage_with_tables_stays_on_its_stead
     """Method `nonlinear`, RK4 at 1/120 kHz."""
     assembly = planetary(variant)
     solver = solver_of(assembly, (50.0, 150.0), "nonlinear", 8)
-    own, every, amplitudes = differences(assembly, solver, 80.0, 5.0, 0.6, 1.0 / 120e3)
-    assert own < 1e-3
-    assert every < 2e-3
-    assert amplitudes < 1e-3
+    np.testing.assert_array_less(differences(assembly, solver, 80.0, 5.0, 0.6, 1.0 / 120e3), (1e-3, 2e-3, 1e-3))
 
 
 @pytest.mark.validation
@@ -287,6 +261,7 @@ def test_speeds_at_which_loads_do_not_settle_are_told():
     assembly, _ = pair({"orders": [1], "torque_N_m": [0.1]})
     data = to_dataset(response_of(assembly, SteadySettings(speeds, "nonlinear", at_resonances=False)))
     assert not data["loads_at_mean_angles"].any()
+    assert data["energy_error"].max() < 1e-6
     assert not any("mean speed" in own.text for own in response_findings(data))
 
 
@@ -298,6 +273,4 @@ def test_a_torque_moves_rolling_bearings_evaluated_in_time_as_in_a_run():
     gearbox = Gearbox.from_dict(content).varied(NON_LINEAR)
     assembly = assemble(gearbox, Choice("bushing"), {"spur": 3e8 * SHAPE})
     solver = solver_of(assembly, (50.0, 200.0), "nonlinear")
-    own, every, _ = differences(assembly, solver, 100.0, 7.0, 0.3, 1.0 / 120e3)
-    assert own < 1e-3
-    assert every < 1e-3
+    np.testing.assert_array_less(differences(assembly, solver, 100.0, 7.0, 0.3, 1.0 / 120e3)[:2], (1e-3, 1e-3))

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.steady.balance.model import HarmonicBalanceModel
 from exugear.steady.balance.response import dissipated_and_given, signals
 from exugear.steady.mean_system.mesh_places import DEFLECTION
 from exugear.steady.peaks import line_name
@@ -22,9 +20,8 @@ from exugear.system.build import assemble
 from exugear.system.tooth_mesh.element import MeshCurve
 
 from ..cases import gear_trains
-from ..cases import table as table_case
 from ..cases.spur import SPUR_CASE
-from ..cases.steady_runs import apart, fitted, solver_of
+from ..cases.steady_runs import SHAPE, apart, fitted, line_at, loose_pair, solver_of
 
 RUN_OUT = {"body": "shaft_1", "runout_um": 20.0, "runout_angle_deg": 30.0}
 PITCH = [0.0, 1.5, 3.0, 2.0, -1.0, -2.5, -1.0, 0.5, 2.0, 1.0]
@@ -38,8 +35,7 @@ SPEEDS = (50.0, 150.0)
 def spur_assembly(bend=None, **deviations):
     """Pair with deviations; `bend` is the exponent of curves of load over deflection, instead of tangents."""
     gearbox = Gearbox.from_dict(tomllib.loads(SPUR_CASE) | {"deviations": deviations})
-    cycle = 2.0 * np.pi * np.arange(50) / 50
-    stiffness = 3e8 * (1.0 + 0.08 * np.cos(cycle) + 0.03 * np.sin(2 * cycle))
+    stiffness = 3e8 * SHAPE
     curve = stiffness if bend is None else MeshCurve(stiffness, bend * stiffness, 4000.0)
     return assemble(gearbox, Choice("bushing"), {"spur": curve})
 
@@ -82,9 +78,7 @@ def two_stages():
     gear = next(iter(content["bodies"][middle]["gears_z_mm"]))
     content["deviations"] = {"middle": {"body": middle, "gear": gear, "runout_um": 30.0}}
     gearbox = Gearbox.from_dict(content)
-    cycle = 2.0 * np.pi * np.arange(50) / 50
-    stiffness = dict.fromkeys(gearbox.pairs, 4e8 * (1.0 + 0.08 * np.cos(cycle) + 0.03 * np.sin(2 * cycle)))
-    assembly = assemble(gearbox, Choice("bushing"), stiffness)
+    assembly = assemble(gearbox, Choice("bushing"), dict.fromkeys(gearbox.pairs, 4e8 * SHAPE))
     return assembly, solver_of(assembly, (100.0, 200.0), "parametric")
 
 
@@ -145,20 +139,6 @@ def test_deviations_on_curves_evaluated_in_time_stay_on_their_steady_state(devia
     assert apart(solver_of(assembly, SPEEDS, "nonlinear"), 60.0, 1.6, 1.0 / 60e3, 0.8, assembly)[0] < 1e-3
 
 
-def table_pair(torque, **deviations):
-    """Pair of a table whose teeth may part, with deviations, and its solver."""
-    case = tomllib.loads(SPUR_CASE)
-    case["static_load"]["torques_N_m"]["shaft_1"] = torque
-    case["damping"] = {"mesh_time_s": 4e-6, "bearing_time_s": 4e-6}
-    for gear in case["gears"].values():
-        gear["tooth_thinning_mm"] = 0.03
-    without = Gearbox.from_dict(case)
-    surface = table_case.surface_of(without, "spur", variation=3.0, stiffness=3e8)
-    gearbox = Gearbox.from_dict(case | {"deviations": deviations})
-    assembly = assemble(gearbox, Choice("bushing", "table"), {"spur": surface})
-    return assembly, solver_of(assembly, (50.0, 2000.0), "nonlinear")
-
-
 @pytest.mark.validation
 @pytest.mark.parametrize("torque", [20.0, -20.0])
 def test_teeth_that_part_once_in_a_revolution_have_the_amplitudes_of_a_run(torque):
@@ -166,27 +146,20 @@ def test_teeth_that_part_once_in_a_revolution_have_the_amplitudes_of_a_run(torqu
 
     Half of the speed at which the mesh frequency is that of the teeth; with reversed torque the other flank bears.
     """
-    assembly, solver = table_pair(torque, one={"body": "shaft_1", "runout_um": 20.0})
+    assembly, solver = loose_pair(torque, deviations={"one": {"body": "shaft_1", "runout_um": 20.0}})
     speed = 0.5 * float(solver.model.system.eigenvalues(100.0).imag.max()) / 20.0
     solver.response(speed)
     state = solver.state
     assert 0.02 < state.response.apart[0] < 0.5
     assert np.isnan(state.growth)
     known = 2.0 * signals(state.model, state.response)[1:, 0]
-    lines = fitted(_Found(state.model), state.response, 1.0, 1.0 / 240e3, 0.5, assembly)[1]
+    lines = fitted(state, state.response, 1.0, 1.0 / 240e3, 0.5, assembly)[1]
     assert np.linalg.norm(abs(lines) - abs(known)) < 1e-3 * np.linalg.norm(known)
-
-
-@dataclass(frozen=True)
-class _Found:
-    """What `fitted` asks of a solver."""
-
-    model: HarmonicBalanceModel
 
 
 def test_a_run_that_looks_for_a_state_has_the_deviations():
     """Started without vibration it settles to the eccentricity."""
-    _, solver = table_pair(100.0, one={"body": "shaft_1", "runout_um": 20.0})
+    _, solver = loose_pair(deviations={"one": {"body": "shaft_1", "runout_um": 20.0}})
     response = solver.response(70.0)
     model = solver.model
     rows = response.interface.ports.readings[:, DEFLECTION]
@@ -223,9 +196,7 @@ def test_gear_trains_of_every_kind_stay_on_their_steady_state_with_an_eccentric_
     """Constant speed, RK4 at 1/60 kHz, the last half of 0.8 s; all lines of the overall error together."""
     content, body, gear, speed = TRAINS[kind]
     gearbox = Gearbox.from_dict(content | {"deviations": {"one": {"body": body, "gear": gear, "runout_um": 20.0}}})
-    cycle = 2.0 * np.pi * np.arange(50) / 50
-    stiffness = dict.fromkeys(gearbox.pairs, 4e8 * (1.0 + 0.08 * np.cos(cycle) + 0.03 * np.sin(2 * cycle)))
-    assembly = assemble(gearbox, Choice("bushing"), stiffness)
+    assembly = assemble(gearbox, Choice("bushing"), dict.fromkeys(gearbox.pairs, 4e8 * SHAPE))
     solver = solver_of(assembly, (0.5 * speed, 2.0 * speed), "parametric")
     assert any("rotation of" in name for name in solver.model.base_names)
     assert apart(solver, speed, 0.8, 1.0 / 60e3, 0.4, assembly)[0] < 2e-3
@@ -281,6 +252,6 @@ def test_the_gearbox_with_deviating_gears_stays_on_its_steady_state(grc, stiffne
     speed, lines = fitted(solver, solver.response(10.0), 3.0, 1.0 / 120e3, 2.0, assembly)
     known = 2.0 * signals(solver.model, solver.response(speed))[1:, 0]
     assert np.linalg.norm(abs(lines) - abs(known)) < 5e-3 * np.linalg.norm(known)
-    place = int(np.argmin(np.abs(solver.model.lines.orders[1:] - order)))
+    place = line_at(solver.model, order) - 1
     assert solver.model.lines.orders[1 + place] == pytest.approx(order, rel=1e-6)
     assert abs(known[place]) == pytest.approx(abs(lines[place]), rel=most)

@@ -11,7 +11,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.templates.kinds import template
 from exugear.gearbox.units import RPM
 from exugear.steady.balance.response import signals
-from exugear.steady.harmonics.branches import standing_peaks
+from exugear.steady.harmonics.branches import peaks_of_lines, standing_peaks
 from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.mean_system.signals import quantities_of
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
@@ -56,8 +56,7 @@ def dense_peaks(assembly, speeds, harmonics, count, most):
     swept = [np.array(own) for own in zip(*(sizes(speed) for speed in at), strict=True)]
     found = {}
     for number, (quantity, values) in enumerate(zip(quantities, swept, strict=True)):
-        peaks = [(point, line) for line in range(values.shape[1]) for point in standing_peaks(values[:, line], CLEARLY)]
-        peaks = sorted(peaks, key=lambda peak: -values[peak])[:most]
+        peaks = sorted(peaks_of_lines(values, CLEARLY), key=lambda peak: -values[peak])[:most]
         own = []
         for point, line in peaks:
             top = scipy.optimize.minimize_scalar(
@@ -118,9 +117,8 @@ def fewest_above_half(response):
     fewest = {}
     for quantity in quantities_of([own.name for own in response.signals], ()):
         sizes = quantity.sizes(response.solved.amplitude[:, 1:]).max(axis=2)
-        peaks = [(point, line) for line in range(sizes.shape[1]) for point in standing_peaks(sizes[:, line])]
         counts = []
-        for point, line in sorted(peaks, key=lambda peak: -sizes[peak])[:10]:
+        for point, line in sorted(peaks_of_lines(sizes), key=lambda peak: -sizes[peak])[:10]:
             low = sizes[:, line] < 0.5 * sizes[point, line]
             before, after = np.flatnonzero(low[:point]), np.flatnonzero(low[point:])
             ends = before.max(initial=-1), point + after.min(initial=len(low) - point)

@@ -19,15 +19,13 @@ from exugear.system.build import elastic_arrays
 from ...optional_libraries import needs_meshio
 from ..cases.assembled import assembled
 from ..cases.ring import ring_content, two_stage_content, write_rim
-from ..cases.steady_runs import planets_apart_over_time, solver_of
+from ..cases.steady_runs import FOUR, planets_apart_over_time, solver_of
 from .test_flexible_planetary_stage import by_order, rows_at
 
 pytestmark = needs_meshio
 
 SPEED = 8.0
 RANGE = (7.0, 9.0)
-FOUR = {"bodies.planet.planet_angles_deg": [0.0, 90.0, 180.0, 270.0]}
-"""With 21 and 99 teeth each is a quarter of a cycle ahead of the one before."""
 STAGES = {
     "three out of phase": {
         "meshes.sun_planet.phase": [0.0, 1.0 / 3.0, 2.0 / 3.0],

@@ -17,11 +17,9 @@ from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.steady_response import follow_branch
 from exugear.system.build import assemble
 
-from .test_steady_in_time import apart, solver_of
+from ..cases.steady_runs import FOUR, apart, solver_of
 
 RANGE = (1.0, 22.5)
-FOUR = {"bodies.planet.planet_angles_deg": [0.0, 90.0, 180.0, 270.0]}
-"""With 21 and 99 teeth each is a quarter of a cycle ahead of the one before."""
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,8 @@ from exugear.project import Project
 from exugear.steady.balance.response import signals
 from exugear.system.build import assemble
 
+from ..cases.steady_runs import fitted, solver_of
 from ..conftest import CASE
-from .test_steady_in_time import fitted, solver_of
 
 pytestmark = [pytest.mark.validation, pytest.mark.long]
 CHOICE = Choice("bushing", "table")

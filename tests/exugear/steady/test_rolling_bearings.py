@@ -9,7 +9,6 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.steady.balance.nonlinear import HarmonicResidual
 from exugear.steady.balance.response import dissipated_and_given, signals
 from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.settings import SpeedRange, SteadySettings
@@ -21,7 +20,7 @@ from ..cases import table as table_case
 from ..cases.assembled import assembled
 from ..cases.bearing import BEARING_CASE, NAMES, NON_LINEAR
 from ..cases.spur import SPUR_CASE
-from .test_steady_in_time import apart, solver_of
+from ..cases.steady_runs import apart, error_of_tangents, solver_of
 
 PLAIN = Gearbox.from_dict(tomllib.loads(BEARING_CASE)).varied(NON_LINEAR)
 CLEARANCES = {
@@ -97,26 +96,9 @@ def test_bearings_take_and_give_power_that_is_balanced(loose_solver, speed):
     assert given == pytest.approx(taken, rel=1e-6)
 
 
-def some(balance, size):
-    values = np.random.default_rng(0).normal(size=(2, *balance.static.shape))
-    lines = size * (values[0] + 1j * values[1]) / balance.model.lengths
-    lines[0] = lines[0].real
-    return lines
-
-
-def difference_of_tangents(solver, speed):
-    balance = HarmonicResidual(solver.model, solver.model.at(speed), solver.sampling)
-    state, step = balance.static + some(balance, 1e-8), some(balance, 1e-11)
-    ahead, behind = balance.forces(state + step)[0], balance.forces(state - step)[0]
-    change = balance.forces(state)[1](step)
-    bearings = np.s_[:, balance.meshes :]
-    assert np.abs(change[bearings]).max() > 0.0
-    return np.linalg.norm((0.5 * (ahead - behind) - change)[bearings]) / np.linalg.norm(change[bearings])
-
-
 def test_the_tangents_of_bearings_are_those_of_differences(loose_solver):
     """Rolling elements that a difference brings into touch leave 1e-5."""
-    assert difference_of_tangents(loose_solver, 80.0) < 1e-4
+    assert error_of_tangents(loose_solver, 80.0, 1e-11, of_bearings=True) < 1e-4
 
 
 @pytest.fixture(scope="module")
@@ -131,7 +113,7 @@ def rows_solver(grc_rows, stiffness):
 
 def test_the_tangents_of_planets_bearings_are_those_of_differences(grc_rows, stiffness):
     solver = solver_of(assemble(grc_rows, Choice("bushing"), stiffness), (1.0, 22.5), "nonlinear", 4, 2)
-    assert difference_of_tangents(solver, 11.0) < 1e-4
+    assert error_of_tangents(solver, 11.0, 1e-11, of_bearings=True) < 1e-4
 
 
 @pytest.mark.validation

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 from pathlib import Path
 
@@ -13,22 +12,20 @@ import scipy.linalg
 from exugear import Choice, Project
 from exugear.steady.mean_system.mean_system import mean_modes
 
+from ..cases.command import script
+
 FOLDER = Path(__file__).parents[3] / "cases" / "grc750"
 NEARLY_THE_FILE = {"housing_factor": 1.0, "inertias": "assemblies", "spin": 1.0, "mass": 0.7, "coupling": 1e6}
 
 
 @pytest.fixture(scope="module")
 def search():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(FOLDER))
-        return importlib.import_module("search_3215")
+    return script(FOLDER, "search_3215")
 
 
 @pytest.fixture(scope="module")
 def drawing(search):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(FOLDER))
-        return importlib.import_module("draw_3215")
+    return script(FOLDER, "draw_3215")
 
 
 @pytest.fixture(scope="module")

@@ -37,6 +37,7 @@ from ..cases.box import box_content
 from ..cases.case_mutations import toml_text
 from ..cases.command import exugear
 from ..cases.spur import SPUR_CASE
+from ..cases.steady_runs import start_of
 
 pytestmark = needs_meshio
 
@@ -170,17 +171,22 @@ def test_the_derivative_of_the_sound_power_is_that_of_a_gearbox_with_a_stiffer_b
     assert derivative[name] == pytest.approx(slope, rel=0.02, abs=0.02)
 
 
+def stored_box(folder: Path, *options: object) -> tuple[Path, Path]:
+    """Gearbox file of the box, and the file of its response from 1400 to 1600 rpm."""
+    case = folder / "box.toml"
+    case.write_text(toml_text(box_content(folder)), encoding="utf-8")
+    asked = ("--variant", "flexible", "--speeds", "1400:1600", *options, "--json")
+    return case, Path(json.loads(exugear("steady", case, *asked).stdout)["file"])
+
+
 @pytest.mark.validation
 def test_velocities_of_the_surface_for_other_programs_radiate_the_same_power(tmp_path):
     """Their normal parts, integrated over the faces of the VTK file as another program reads it: 2 x 2 Gauss points.
 
     The speed is solved again: iterations end at a thousandth of an order.
     """
-    case = tmp_path / "box.toml"
-    case.write_text(toml_text(box_content(tmp_path)), encoding="utf-8")
     out = tmp_path / "out"
-    options = ("--variant", "flexible", "--speeds", "1400:1600", "--points", "3", "--out", out)
-    file = Path(json.loads(exugear("steady", case, *options, "--json").stdout)["file"])
+    case, file = stored_box(tmp_path, "--points", "3", "--out", out)
     asked = ("export", case, "--surface", file, "--speed", 1500, "--out", out)
     summary = json.loads(exugear(*asked, "--json").stdout)
     dataset, drawn = (Path(name) for name in summary["files"])
@@ -219,10 +225,7 @@ def test_velocities_of_the_surface_for_other_programs_radiate_the_same_power(tmp
     ],
 )
 def test_velocities_of_the_surface_need_a_computed_speed(tmp_path, more, said):
-    case = tmp_path / "box.toml"
-    case.write_text(toml_text(box_content(tmp_path)), encoding="utf-8")
-    options = ("--variant", "flexible", "--mesh-model", "iso6336", "--speeds", "1400:1600", "--points", "2")
-    file = Path(json.loads(exugear("steady", case, *options, "--out", tmp_path, "--json").stdout)["file"])
+    case, file = stored_box(tmp_path, "--mesh-model", "iso6336", "--points", "2", "--out", tmp_path)
     outcome = exugear("export", case, "--surface", file, "--out", tmp_path, *more)
     assert outcome.exit_code == 2 and said in " ".join(outcome.stderr.split())
 
@@ -231,10 +234,7 @@ def test_velocities_of_the_surface_need_a_computed_speed(tmp_path, more, said):
 def test_velocities_of_the_surface_need_a_whole_response_and_room(tmp_path):
     """Damaged responses are refused, and a file that is too large for the disk leaves nothing behind."""
     resource = pytest.importorskip("resource", reason="limits of a POSIX system")
-    case = tmp_path / "box.toml"
-    case.write_text(toml_text(box_content(tmp_path)), encoding="utf-8")
-    options = ("--variant", "flexible", "--mesh-model", "iso6336", "--speeds", "1400:1600", "--points", "2")
-    file = Path(json.loads(exugear("steady", case, *options, "--out", tmp_path, "--json").stdout)["file"])
+    case, file = stored_box(tmp_path, "--mesh-model", "iso6336", "--points", "2", "--out", tmp_path)
     asked = ("--speed", 1400, "--out", tmp_path, "--to", tmp_path / "to")
     broken = tmp_path / "broken.nc"
     for damaged in damages(file.read_bytes(), 12):
@@ -268,10 +268,7 @@ def test_power_of_surface_velocities_in_a_run_is_that_of_the_steady_orders(house
     area = model.radiated.area
     expected = 0.5 * AIR_IMPEDANCE * area * float(np.sum(steady**2))
 
-    system, motion = model.system, response.motion
-    w = response.interface.frequencies[1:, None]
-    u = system.static_at(speed) + motion[0].real + 2.0 * motion[1:].sum(axis=0).real
-    q, v, _ = system.frame.state(0.0, speed, u, 2.0 * (1j * w * motion[1:]).sum(axis=0).real)
+    q, v = start_of(model, response)
     load = housed.gearbox.case.static_load
     period = 2.0 * math.pi / (speed * float(model.lines.orders[1]))
     steps = 400

@@ -10,7 +10,7 @@ import pytest
 from exugear.gearbox.choice import Choice
 from exugear.steady.campbell import campbell_from
 from exugear.steady.mean_system.planet_sets import SteadyError
-from exugear.steady.peaks import line_name, peaks, planet_sidebands, sidebands
+from exugear.steady.peaks import peaks, planet_sidebands, sidebands
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import load_response, partial_path, stored_or_computed
 from exugear.steady.steady_response import response_of
@@ -142,11 +142,6 @@ def test_a_planet_feels_waves_at_the_line_plus_and_minus_its_carrier(assembly, t
     assert found["+"].amplitude == pytest.approx(known[43], rel=1e-6)
     assert found["-"].amplitude == pytest.approx(known[37], rel=1e-6)
     assert found["+"].frequency - peak.frequency == pytest.approx(peak.speed / 2.0 / np.pi)
-
-
-def test_combinations_are_named_by_their_bases():
-    assert line_name((1, -2, 0), ("a, b", "c", "d")) == "a - 2 x c"
-    assert line_name((0, 0, 0), ("a", "b", "c")) == "mean"
 
 
 @pytest.mark.parametrize(

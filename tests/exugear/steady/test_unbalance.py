@@ -19,9 +19,9 @@ from exugear.system.system import Assembly
 
 from ..cases import gear_trains
 from ..cases.assembled import assembled
-from ..cases.both_ways import compiled_states, exudyn_states
+from ..cases.both_ways import assert_both_solvers_move_alike
 from ..cases.spur import SPUR_CASE
-from ..cases.steady_runs import fitted, solver_of
+from ..cases.steady_runs import SHAPE, fitted, line_at, solver_of
 from ..system.test_point_forces import content
 
 MASS, TRANSVERSE, POLAR = 1.0, 1e-2, 4e-3
@@ -48,7 +48,7 @@ def rotor(excitation: dict[str, Any], radial_y: float = STIFFNESS) -> Assembly:
 
 def motion_at(solver: PointSolver, speed: float, order: float = 1.0) -> np.ndarray:
     """Complex amplitudes x y z a b of shaft 1 at an order, of Re(u exp(i order |angle|))."""
-    line = int(np.argmin(np.abs(solver.model.lines.orders - order)))
+    line = line_at(solver.model, order)
     assert solver.model.lines.orders[line] == pytest.approx(order)
     found = 2.0 * solver.response(speed).motion[line]
     return found[list(solver.model.system.frame.assembly.coordinates["shaft_1"][:5])]
@@ -90,14 +90,6 @@ def test_forces_move_a_rotor_along_their_direction_at_their_order(direction):
     found = motion_at(solver, 1500.0, 3.0)
     np.testing.assert_allclose(found[:2], expected, rtol=1e-6)
     assert abs(found[2]) == pytest.approx(20.0 / abs(1e8 - w**2) if direction == "fixed" else 0.0, rel=1e-3, abs=1e-18)
-
-
-def test_a_rotating_force_that_grows_with_the_square_of_the_speed_is_an_unbalance():
-    """The same motion at one speed: the force of 50 g mm at 2500 rad/s is 312.5 N."""
-    force = {"body": "shaft_1", "z_mm": 40.0, "orders": [1], "force_N": [[312.5, 0.0, 0.0]], "direction": "rotating"}
-    as_force = motion_at(solver_of(rotor(force | {"phase_deg": [30.0]}), SPEEDS, "linear", 1), 2500.0)
-    as_unbalance = motion_at(solver_of(rotor(UNBALANCE | {"z_mm": 40.0}), SPEEDS, "linear", 1), 2500.0)
-    np.testing.assert_allclose(as_force, as_unbalance, rtol=1e-9)
 
 
 def residual_in_space(assembly: Assembly, speed: float) -> float:
@@ -183,9 +175,7 @@ def geared(**changes: Any) -> Assembly:
     """Pair of gears with an unbalance beside the gear of shaft 1."""
     content = tomllib.loads(SPUR_CASE)
     content["excitations"] = {"unbalance": UNBALANCE | {"z_mm": 15.0, "unbalance_g_mm": 2e3} | changes}
-    cycle = 2.0 * np.pi * np.arange(50) / 50
-    waves = 0.08 * np.cos(cycle) + 0.03 * np.sin(2 * cycle)
-    return assemble(Gearbox.from_dict(content), Choice("bushing"), {"spur": 3e8 * (1.0 + waves)})
+    return assemble(Gearbox.from_dict(content), Choice("bushing"), {"spur": 3e8 * SHAPE})
 
 
 def test_a_run_started_on_the_steady_state_with_unbalance_stays_there():
@@ -194,7 +184,7 @@ def test_a_run_started_on_the_steady_state_with_unbalance_stays_there():
     solver = solver_of(assembly, (50.0, 150.0), "parametric")
     speed, lines = fitted(solver, solver.response(88.0), 0.8, 1.0 / 60e3, 0.4, assembly)
     known = 2.0 * signals(solver.model, solver.response(speed))[1:, 0]
-    line = int(np.argmin(np.abs(solver.model.lines.orders[1:] - 1.0)))
+    line = line_at(solver.model, 1.0) - 1
     assert abs(lines[line] - known[line]) < 1e-4 * abs(known[line])
     assert np.linalg.norm(lines - known) < 1e-4 * np.linalg.norm(known)
 
@@ -210,11 +200,7 @@ def test_both_solvers_have_the_same_unbalance():
     x, y = size * np.cos(0.7 + np.pi / 6.0), size * np.sin(0.7 + np.pi / 6.0)
     expected = [x, y, 0.0, -0.015 * y, 0.015 * x, 0.0]
     np.testing.assert_allclose(applied[list(assembly.coordinates["shaft_1"])], expected, rtol=1e-12, atol=1e-15)
-    load = {"shaft_1": 100.0, "shaft_2": 150.0}
-    ours, exudyns = (states(assembly, q, v, load, 60, 2e-6)[0] for states in (compiled_states, exudyn_states))
-    np.testing.assert_allclose(ours - q, exudyns - q, rtol=0.0, atol=1e-6 * np.abs(ours - q).max(axis=0).min())
-    without = compiled_states(geared(enabled=False), q, v, load, 60, 2e-6)[0]
-    assert np.abs(without - ours).max() > 1e-9
+    assert_both_solvers_move_alike(assembly, q, v, geared(enabled=False))
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 import scipy.integrate
 import scipy.optimize
 
-from exugear.steady.harmonics.branches import Scales, exponents, kicks_needed, trace
+from exugear.steady.harmonics.branches import Scales, exponents, trace
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
 from exugear.steady.harmonics.lines import line_set, rank1_lattice
 
@@ -103,17 +103,6 @@ def test_every_fold_of_a_pair_with_backlash_is_that_of_shooting_in_time(branch, 
     assert frequency == pytest.approx(fold_by_shooting(state_of(branch, point), frequency), rel=5e-4)
 
 
-def test_a_state_follows_changes_of_the_first_as_the_variational_equations_say():
-    """Through contact, backlash and contact again: differences of ends, whose steps of 1e-4 err by 1e-6."""
-    state, frequency = np.array([-0.42, -2.79]), 0.83
-    _, monodromy = one_period(state, frequency)
-    ends = [[one_period(state + sign * e, frequency)[0] for sign in (1, -1)] for e in 1e-4 * np.eye(2)]
-    differences = np.array([(up - down) / 2e-4 for up, down in ends]).T
-    assert np.abs(monodromy - differences).max() < 1e-4 * np.abs(differences).max()
-    # What damping takes from areas of states, whatever the contact does (Liouville).
-    assert np.linalg.det(monodromy) == pytest.approx(np.exp(-4.0 * np.pi * DAMPING / frequency), rel=1e-7)
-
-
 @pytest.mark.validation
 def test_stability_changes_at_the_folds_and_nowhere_else(branch):
     """Floquet exponents in every point of the branch, which passes eight folds."""
@@ -151,7 +140,3 @@ def test_a_start_that_leads_nowhere_is_told():
 
     with pytest.raises(HarmonicBalanceError, match="continuation: no solution at the start 1"):
         trace(residual, np.zeros(2, dtype=complex), 1.0, 2.0, Scales(1.0, 1.0), step=0.1, longest=0.1)
-
-
-def test_kicks_follow_the_fastest_mode():
-    assert kicks_needed(500.0, 0.1) == 300

@@ -11,7 +11,7 @@ from exugear.steady.mean_system.rotating_frame import RotatingFrame
 from exugear.steady.settling import frame_coordinates
 from exugear.system.build import assemble
 
-FOUR = {"bodies.planet.planet_angles_deg": [0.0, 90.0, 180.0, 270.0]}
+from ...cases.steady_runs import FOUR
 
 
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
