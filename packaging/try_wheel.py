@@ -31,9 +31,9 @@ FIRST_HOUR = (
     "modes first.toml",
     "steady first.toml",
     "run first.toml",
-    "report results --levers",
+    "report results/work --levers",
 )
-"""Commands of the first hour in an empty folder; all but the first two write into `results`."""
+"""Commands of the first hour in an empty folder; all but the first two write into `results/work`."""
 TABLE = re.compile(r"(<!-- written by packaging/try_wheel.py -->\n).*?(<!-- end of the table -->)", re.DOTALL)
 
 
@@ -118,7 +118,7 @@ def first_hour(python: str, wheel: Path, constraint: Path | None) -> dict[str, f
             begin = time.perf_counter()
             run(work, own / "exugear", *command.split())
             found[f"`exugear {command}`"] = time.perf_counter() - begin
-        assert (work / "results" / "report.html").is_file()
+        assert (work / "results" / "work" / "report.html").is_file()
     return found
 
 

@@ -60,7 +60,7 @@ MESH_MODEL_LABELS = {
 METHOD_LABELS = {
     "linear": "mean stiffness",
     "parametric": "time-varying stiffness",
-    "nonlinear": "nonlinear, with contact loss",
+    "nonlinear": "mesh models evaluated in time",
 }
 """Names of the methods of steady-state responses on the page."""
 

@@ -322,11 +322,13 @@ class HarmonicResidual:
                 found = _mean_of_waves(there, back, slopes)
             self._less_mean(found, slopes is sampled.damping)
             means.append(found.reshape(-1, m * r))
-        unit = np.eye(m * r)
         # Rates of the waves as their meshes see them: their own, and what the turning carries along.
         carried = self.interface.speed * np.kron(self.model.partners, np.eye(r))
-        forces = means[0] + means[1] @ (1j * self.interface.frequencies[:, None, None] * unit + carried)
-        return np.asarray(unit + self.interface.readings.reshape(n, m * r, -1) @ forces)
+        answers = self.interface.readings.reshape(n * m * r, -1)
+        by_place, by_rate = (
+            (answers @ slopes).reshape(n, m * r, m * r) for slopes in (means[0] + means[1] @ carried, means[1])
+        )
+        return np.asarray(np.eye(m * r) + by_place + 1j * self.interface.frequencies[:, None, None] * by_rate)
 
     def _less_mean(self, slopes: Floats, by_rates: bool) -> None:
         """Subtract the slopes of the averaged system from slopes (..., m, f, m, r)."""
