@@ -39,7 +39,7 @@ from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
 from exugear.steady.harmonics.lines import LineSet, TorusSampling, joined, largest
 from exugear.steady.mean_system.carrier_stability import growth_over_carrier
 from exugear.steady.mean_system.mean_system import Steps, mean_system
-from exugear.steady.mean_system.mesh_places import DEFLECTION, POSITION
+from exugear.steady.mean_system.mesh_places import BACK, DEFLECTION, POSITION
 from exugear.steady.mean_system.mesh_waves import FEWEST, mesh_waves
 from exugear.steady.mean_system.shaft_orders import any_shaft_orders, shaft_orders, without_deviations
 from exugear.steady.settings import Method
@@ -54,6 +54,8 @@ ALIASED = 2e-4
 """The same of the residual on other samples, up to which those of the balance do where something parts."""
 DROP_LINE_TOL = 2e-5
 """The same of lines that a state has, up to which the next speed begins without them."""
+FORCELESS = 1e-6
+"""Share of the variation of the meshes' forces in lines whose answers are not looked at where there are thousands."""
 ROUGH = 1e-5
 """Residual of the balance over the size of the deflections up to which it is solved before lines are added."""
 UNEQUAL = 5e-4
@@ -434,7 +436,7 @@ def _lacking(balance: HarmonicResidual, readings: Complexes) -> LineSet | None:
 
     Their forces are those on the samples that the state has; what each line answers by itself is taken for its size.
     """
-    whole = balance.model.whole
+    whole = _acted_on(balance, readings)
     size = float(np.linalg.norm(readings[1:, :, DEFLECTION]))
     ahead = HarmonicResidual(whole, whole.at(balance.interface.speed), whole.sampling)
     start = readings_in(balance.model, readings, whole)
@@ -448,6 +450,22 @@ def _lacking(balance: HarmonicResidual, readings: Complexes) -> LineSet | None:
     if wanted.any():
         return whole.lines.part(wanted)
     return None
+
+
+def _acted_on(balance: HarmonicResidual, readings: Complexes) -> HarmonicBalanceModel:
+    """Return the model with all lines of its larger set; where stiffness varies, those on which meshes act noticeably.
+
+    There are thousands of lines then, whose answers would take most of the time.
+    """
+    whole = balance.model.whole
+    if not whole.waves.neighbours:
+        return whole
+    samples = TorusSampling(whole.lines, balance.sampling.generator, balance.sampling.samples)
+    forces = samples.coefficients(balance.places.back @ balance.forces(readings)[2])[..., : BACK + 1]
+    sizes = np.linalg.norm(forces, axis=(1, 2))
+    own = np.isin(np.arange(len(sizes)), balance.model.places_in(whole)[0])
+    vibration = float(np.linalg.norm(sizes[1:][own[1:]]))
+    return whole.of(own | largest(np.where(own, 0.0, sizes), FORCELESS * vibration))
 
 
 def _sizes(model: HarmonicBalanceModel, readings: Complexes) -> Floats:
