@@ -177,7 +177,7 @@ def check_law(name: str, method: Method) -> None:
 
 
 def check_nonlinear(gearbox: Gearbox, method: Method) -> None:
-    """Refuse trains without meshes, and displaced planet pins, with the method that evaluates models in time.
+    """Refuse trains without meshes, and displaced pins of planets that are alike, with models evaluated in time.
 
     Raises
     ------
@@ -195,8 +195,8 @@ def check_nonlinear(gearbox: Gearbox, method: Method) -> None:
     alike = {body.name for body in gearbox.bodies() if body.carrier is not None and body.carrier not in unlike}
     if alike & gearbox.pin_offsets.keys():
         raise SteadyError(
-            "pins: the method nonlinear does not include displaced planet pins; use --method parametric with "
-            "--mesh-model line_of_action, or exugear run"
+            "pins: the method nonlinear does not include displaced pins of equally spaced planets; use --method "
+            "parametric with --mesh-model line_of_action, or exugear run"
         )
 
 

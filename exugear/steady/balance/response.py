@@ -15,7 +15,7 @@ Deviations of gears are a given displacement in both methods: see `exugear.stead
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -75,7 +75,7 @@ class Response:
     """(m,) share of time in which teeth are apart."""
     free: Floats
     """(b,) share of time in which no rolling element of a non-linear bearing touches, by law."""
-    of_bearings: Complexes = field(default_factory=lambda: np.zeros((0, 0), dtype=complex))
+    of_bearings: Complexes
     """(n, c) forces along coordinates of the bearings that vary with the carrier, beyond the averaged system."""
 
     @cached_property
