@@ -290,9 +290,9 @@ class SteadyResponse(ReprMixin):
 CHECKED, MORE = 10, 1.5
 """Number of highest peaks that are recomputed, and the factor on the number of harmonics."""
 PEAKS_WITH_CONTRIBUTIONS = 20
+"""Crossings whose peaks are taken apart."""
 LINES_WITH_CONTRIBUTIONS = 5
 """Loudest lines whose sound power is explained."""
-"""Crossings whose peaks are taken apart."""
 ROUNDS = 5
 """Times that tops, and then speeds on flanks, are looked for between speeds, at most."""
 SLOWEST_BRANCH = 0.01

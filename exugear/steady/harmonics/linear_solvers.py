@@ -109,6 +109,8 @@ def solve_lines(
     )
 
 
+ROWS_TOGETHER = 8
+"""Rows that stay in fast memory while earlier ones pass: each of these is read from slow memory once for all of them."""
 LEFT_OVER = 1e-10
 """Residual over the load up to which a solution counts as such, both by the sum of all loads."""
 
@@ -117,28 +119,14 @@ class Elimination(NamedTuple):
     """Order and places of an elimination of systems of one pattern with n rows and e entries, filled ones too."""
 
     order: Integers
-    """(n,) row that is eliminated in each step."""
+    """(n,) row that is eliminated in each step; rows and columns are numbered by step from here on."""
     row: Integers
     column: Integers
-    """(e,) place of each entry in the matrix."""
-    diagonal: Integers
-    """(n,) entry on the diagonal, by step."""
+    """(e,) place of each entry, row by row."""
     first: Integers
-    """(n + 1,) first of the later rows that each step touches, in the three arrays that follow."""
-    later: Integers
-    """(r,) steps in which these rows are eliminated."""
-    below: Integers
-    right: Integers
-    """(r,) entries in the column and in the row of the step."""
-    above: Integers
-    """(n + 1,) first of the earlier steps that touch the row of each step, in the two arrays that follow."""
-    earlier: Integers
-    touch: Integers
-    """(r,) those steps, ascending, and their places among `later`."""
-    change: Integers
-    """(n,) first of the entries in `changed` that each step changes, row by row of its later rows."""
-    changed: Integers
-    """(c,) entries."""
+    """(n + 1,) first entry of each row."""
+    diagonal: Integers
+    """(n,) entry on the diagonal."""
 
 
 def elimination(pattern: Booleans) -> Elimination:
@@ -149,46 +137,27 @@ def elimination(pattern: Booleans) -> Elimination:
     A chain needs no more entries than it has:
 
     >>> found = elimination(np.abs(np.subtract.outer(np.arange(5), np.arange(5))) < 2)
-    >>> len(found.row), len(found.changed)
-    (13, 4)
+    >>> len(found.row), found.first.tolist()
+    (13, [0, 2, 5, 8, 11, 13])
     """
     n = len(pattern)
-    linked = pattern | pattern.T
-    np.fill_diagonal(linked, True)
-    filled = linked.copy()
+    filled = pattern | pattern.T
+    np.fill_diagonal(filled, True)
     left = np.ones(n, dtype=bool)
-    order = []
-    touched: list[Integers] = []
-    for _ in range(n):
+    order = np.empty(n, dtype=np.int64)
+    for step in range(n):
         counts = np.where(left, (filled & left).sum(axis=1), n + 1)
-        k = int(np.argmin(counts))
+        k = order[step] = int(np.argmin(counts))
         left[k] = False
         others = np.flatnonzero(filled[k] & left)
         filled[np.ix_(others, others)] = True
-        order.append(k)
-        touched.append(others)
-    step = np.empty(n, dtype=np.int64)
-    step[order] = np.arange(n)
-    row, column = np.nonzero(filled)
-    entry = np.full((n, n), -1, dtype=np.int64)
-    entry[row, column] = np.arange(len(row))
-    none = np.zeros(0, dtype=np.int64)
-    later = np.concatenate([none, *(step[others] for others in touched)])
-    touch = np.argsort(later, kind="stable").astype(np.int64)
+    row, column = np.nonzero(filled[np.ix_(order, order)])
     return Elimination(
-        order=np.array(order, dtype=np.int64),
+        order=order,
         row=row.astype(np.int64),
         column=column.astype(np.int64),
-        diagonal=entry[order, order],
-        first=np.cumsum([0, *map(len, touched)]).astype(np.int64),
-        later=later,
-        below=np.concatenate([none, *(entry[others, k] for k, others in zip(order, touched, strict=True))]),
-        right=np.concatenate([none, *(entry[k, others] for k, others in zip(order, touched, strict=True))]),
-        above=np.searchsorted(later[touch], np.arange(n + 1)).astype(np.int64),
-        earlier=np.repeat(np.arange(n), [len(others) for others in touched])[touch],
-        touch=touch,
-        change=np.cumsum([0, *(len(others) ** 2 for others in touched[:-1])]).astype(np.int64),
-        changed=np.concatenate([none, *(entry[np.ix_(others, others)].ravel() for others in touched)]),
+        first=np.searchsorted(row, np.arange(n + 1)).astype(np.int64),
+        diagonal=np.flatnonzero(row == column).astype(np.int64),
     )
 
 
@@ -246,15 +215,15 @@ def solve_side_by_side(
     own : (lines, n) loads of each line by itself, which are replaced by their amplitudes
     """
     stiffness, damping, mass = pencil
-    places = (plan.row, plan.column)
     order = plan.order
+    places = (order[plan.row], order[plan.column])
     loaded = np.flatnonzero(own.any(axis=1))
     sizes = np.abs(own[loaded]).max(axis=1, initial=0.0)
     # Behind the loads of those lines that have some are none, for all others.
     alone = np.append(own[loaded] / sizes[:, None], np.zeros((1, len(order))), axis=0)
     place = np.full(len(own), len(loaded), dtype=np.int64)
     place[loaded] = np.arange(len(loaded))
-    memory = aligned_zeros(2 * SIZE * max(len(plan.row), 2 * len(order))).reshape(2, -1)
+    matrix = aligned_zeros(2 * SIZE * max(len(plan.row), 2 * len(order)))
     x = aligned_zeros(2 * SIZE * len(order) * (loads.shape[1] + 2))
     of_loads = np.ascontiguousarray(loads[order]), np.ascontiguousarray(alone[:, order]).view(np.float64)
     missing = np.zeros(len(frequencies))
@@ -267,8 +236,8 @@ def solve_side_by_side(
         frequencies,
         *of_loads,
         place,
-        memory[0],
-        memory[1],
+        matrix,
+        np.empty((ROWS_TOGETHER, len(order)), dtype=np.int64),
         x,
         amplitudes.view(np.float64),
         found.view(np.float64),
@@ -277,11 +246,9 @@ def solve_side_by_side(
     # A residual that is no number is none that is small.
     for line in np.flatnonzero(~(missing <= LEFT_OVER)):
         w = frequencies[line]
-        matrix = stiffness - w**2 * mass + 1j * w * damping
-        amplitudes[line], found[place[line]] = (
-            np.linalg.solve(matrix, loads),
-            np.linalg.solve(matrix, alone[place[line]]),
-        )
+        dynamic = stiffness - w**2 * mass + 1j * w * damping
+        amplitudes[line] = np.linalg.solve(dynamic, loads)
+        found[place[line]] = np.linalg.solve(dynamic, alone[place[line]])
     own[loaded] = found[:-1] * sizes[:, None]
 
 
@@ -296,8 +263,8 @@ def solve_octets(
     loads: Floats,
     own: Floats,
     place: Integers,
-    real: Floats,
-    imaginary: Floats,
+    matrix: Floats,
+    entries: Integers,
     x: Floats,
     out: Floats,
     out_own: Floats,
@@ -306,8 +273,8 @@ def solve_octets(
     """Fill amplitudes (lines, n, 2 cases), those of own loads (rows, 2 n), and residuals over loads (lines,).
 
     Real and imaginary parts are in turns. Matrices are given by their entries (e,), loads (n, cases) and own loads
-    (rows, 2 n) in the order of the elimination; `place` (lines,) is the row of each line. `real` and `imaginary` (8 e,
-    or 16 n if that is more) and `x` (16 n (cases + 2),) are memory.
+    (rows, 2 n) in the order of the elimination; `place` (lines,) is the row of each line. `matrix` (16 e, or 32 n if
+    that is more), `entries` (`ROWS_TOGETHER`, n) and `x` (16 n (cases + 2),) are memory.
     """
     size = plan.order.size
     lines = batches.lines.size
@@ -321,10 +288,10 @@ def solve_octets(
             continue
         w = frequencies_of(begin, count, batches.lines, frequencies, x)
         for entry in range(stiffness.size):
-            put(real, SIZE * entry, stiffness[entry] - w * w * mass[entry])
-            put(imaginary, SIZE * entry, w * damping[entry])
+            put(matrix, 2 * SIZE * entry, stiffness[entry] - w * w * mass[entry])
+            put(matrix, 2 * SIZE * entry + SIZE, w * damping[entry])
         put_loads(begin, count, octet, batches, loads, own, place, x)
-        eliminate(plan, cases, real, imaginary, x)
+        eliminate(plan, cases, matrix, entries, x)
         for lane in range(count):
             line = batches.lines[begin + lane]
             for k in range(size):
@@ -338,9 +305,9 @@ def solve_octets(
                 if shared < cases:
                     out_own[place[line], 2 * row] = x[at]
                     out_own[place[line], 2 * row + 1] = x[at + SIZE]
-        scale = add_cases(plan.order, cases, real, imaginary, x)
+        scale = add_cases(size, cases, matrix, x)
         frequencies_of(begin, count, batches.lines, frequencies, x)
-        leave_over(plan, stiffness, damping, mass, real, imaginary, x)
+        leave_over(plan, stiffness, damping, mass, matrix, x)
         for lane in range(count):
             missing[batches.lines[begin + lane]] = math.sqrt(x[lane]) / scale
 
@@ -384,14 +351,13 @@ def put_loads(
 
 
 @kernel
-def add_cases(order: Integers, cases: int, real: Floats, imaginary: Floats, x: Floats) -> float:
-    """Put the sum of the solutions of all cases into the first 8 n numbers of the memory, by row, its loads behind.
+def add_cases(size: int, cases: int, sums: Floats, x: Floats) -> float:
+    """Put the sum of the solutions of all cases into the first 16 n numbers of `sums`, what acts there behind them.
 
     Returns
     -------
     largest load of any line and row
     """
-    size = order.size
     scale = 0.0
     for k in range(size):
         a = all_eight(0.0)
@@ -400,105 +366,108 @@ def add_cases(order: Integers, cases: int, real: Floats, imaginary: Floats, x: F
             at = 2 * SIZE * (k * cases + case)
             a = a + eight(x, at)
             b = b + eight(x, at + SIZE)
-        put(real, SIZE * order[k], a)
-        put(imaginary, SIZE * order[k], b)
+        put(sums, 2 * SIZE * k, a)
+        put(sums, 2 * SIZE * k + SIZE, b)
         at = 2 * SIZE * (size * cases + k)
-        for lane in range(SIZE):
-            scale = max(scale, abs(x[at + lane]), abs(x[at + SIZE + lane]))
-        put(real, SIZE * (size + order[k]), -1.0 * eight(x, at))
-        put(imaginary, SIZE * (size + order[k]), -1.0 * eight(x, at + SIZE))
+        for lane in range(2 * SIZE):
+            scale = max(scale, abs(x[at + lane]))
+        put(sums, 2 * SIZE * (size + k), -1.0 * eight(x, at))
+        put(sums, 2 * SIZE * (size + k) + SIZE, -1.0 * eight(x, at + SIZE))
     return max(scale, 1e-300)
 
 
 @kernel
-def leave_over(
-    plan: Elimination, stiffness: Floats, damping: Floats, mass: Floats, real: Floats, imaginary: Floats, x: Floats
-) -> None:
-    """Turn eight frequencies, the first numbers of `x`, into the squares of what solutions in the memory leave over."""
+def leave_over(plan: Elimination, stiffness: Floats, damping: Floats, mass: Floats, sums: Floats, x: Floats) -> None:
+    """Turn eight frequencies, the first numbers of `x`, into the squares of what solutions in `sums` leave over."""
     size = plan.order.size
     w = eight(x, 0)
     for entry in range(stiffness.size):
         p = stiffness[entry] - w * w * mass[entry]
         q = w * damping[entry]
-        at = SIZE * plan.column[entry]
-        to = SIZE * (size + plan.row[entry])
-        a = eight(real, at)
-        b = eight(imaginary, at)
-        put(real, to, eight(real, to) + p * a - q * b)
-        put(imaginary, to, eight(imaginary, to) + p * b + q * a)
+        at = 2 * SIZE * plan.column[entry]
+        to = 2 * SIZE * (size + plan.row[entry])
+        a = eight(sums, at)
+        b = eight(sums, at + SIZE)
+        put(sums, to, eight(sums, to) + p * a - q * b)
+        put(sums, to + SIZE, eight(sums, to + SIZE) + p * b + q * a)
     total = all_eight(0.0)
-    for row in range(size, 2 * size):
-        a = eight(real, SIZE * row)
-        b = eight(imaginary, SIZE * row)
-        total = total + a * a + b * b
+    for place in range(2 * size, 4 * size):
+        a = eight(sums, SIZE * place)
+        total = total + a * a
     put(x, 0, total)
 
 
 @kernel
-def eliminate(plan: Elimination, cases: int, real: Floats, imaginary: Floats, x: Floats) -> None:
-    """Solve eight systems, whose entries (8 e,) are overwritten, for a number of loads, which become the solutions."""
+def eliminate(plan: Elimination, cases: int, matrix: Floats, entries: Integers, x: Floats) -> None:
+    """Solve eight systems, whose entries (16 e,) are overwritten, for a number of loads, which become the solutions.
+
+    Rows pass through in blocks: `entries` has those of each row of a block by their columns, -1 where there is none.
+    """
     size = plan.order.size
-    for k in range(size):
-        eliminate_row(k, cases, plan, real, imaginary, x)
-        invert(SIZE * plan.diagonal[k], real, imaginary)
+    for begin in range(0, size, entries.shape[0]):
+        end = min(begin + entries.shape[0], size)
+        for i in range(begin, end):
+            for k in range(size):
+                entries[i - begin, k] = -1
+            for entry in range(plan.first[i], plan.first[i + 1]):
+                entries[i - begin, plan.column[entry]] = entry
+        for k in range(end):
+            if k >= begin:  # all steps before have been taken out of it
+                invert(2 * SIZE * plan.diagonal[k], matrix)
+            for i in range(max(begin, k + 1), end):
+                if entries[i - begin, k] >= 0:
+                    take_out(k, i, entries[i - begin], cases, plan, matrix, x)
     for k in range(size - 1, -1, -1):
-        substitute_back(k, cases, plan, real, imaginary, x)
+        substitute_back(k, cases, plan, matrix, x)
 
 
 @kernel
-def invert(at: int, real: Floats, imaginary: Floats) -> None:
+def invert(at: int, matrix: Floats) -> None:
     """Take the inverse of the eight entries at a place."""
     for i in range(at, at + SIZE):
-        square = real[i] * real[i] + imaginary[i] * imaginary[i]
-        real[i], imaginary[i] = real[i] / square, -imaginary[i] / square
+        square = matrix[i] * matrix[i] + matrix[i + SIZE] * matrix[i + SIZE]
+        matrix[i], matrix[i + SIZE] = matrix[i] / square, -matrix[i + SIZE] / square
 
 
 @kernel
-def eliminate_row(i: int, cases: int, plan: Elimination, real: Floats, imaginary: Floats, out: Floats) -> None:
-    """Take all earlier rows, their diagonals inverted, out of the row of step i, which stays in the fastest memory."""
-    for at_step in range(plan.above[i], plan.above[i + 1]):
-        k = plan.earlier[at_step]
-        touch = plan.touch[at_step]
-        begin = plan.first[k]
-        end = plan.first[k + 1]
-        change = plan.change[k] + (touch - begin) * (end - begin)
-        x = eight(real, SIZE * plan.diagonal[k])
-        y = eight(imaginary, SIZE * plan.diagonal[k])
-        a = eight(real, SIZE * plan.below[touch])
-        b = eight(imaginary, SIZE * plan.below[touch])
-        factor = a * x - b * y
-        turned = a * y + b * x
-        for j in range(begin, end):
-            at = SIZE * plan.right[j]
-            to = SIZE * plan.changed[change]
-            change += 1
-            a = eight(real, at)
-            b = eight(imaginary, at)
-            put(real, to, eight(real, to) - factor * a + turned * b)
-            put(imaginary, to, eight(imaginary, to) - factor * b - turned * a)
-        for case in range(cases):
-            at = 2 * SIZE * (k * cases + case)
-            to = 2 * SIZE * (i * cases + case)
-            a = eight(out, at)
-            b = eight(out, at + SIZE)
-            put(out, to, eight(out, to) - factor * a + turned * b)
-            put(out, to + SIZE, eight(out, to + SIZE) - factor * b - turned * a)
+def take_out(k: int, i: int, entries: Integers, cases: int, plan: Elimination, matrix: Floats, out: Floats) -> None:
+    """Take step k, its diagonal inverted, out of the row of step i, whose entries (n,) are given by their columns."""
+    x = eight(matrix, 2 * SIZE * plan.diagonal[k])
+    y = eight(matrix, 2 * SIZE * plan.diagonal[k] + SIZE)
+    a = eight(matrix, 2 * SIZE * entries[k])
+    b = eight(matrix, 2 * SIZE * entries[k] + SIZE)
+    factor = a * x - b * y
+    turned = a * y + b * x
+    for entry in range(plan.diagonal[k] + 1, plan.first[k + 1]):
+        at = 2 * SIZE * entry
+        to = 2 * SIZE * entries[plan.column[entry]]
+        a = eight(matrix, at)
+        b = eight(matrix, at + SIZE)
+        put(matrix, to, eight(matrix, to) - factor * a + turned * b)
+        put(matrix, to + SIZE, eight(matrix, to + SIZE) - factor * b - turned * a)
+    for case in range(cases):
+        at = 2 * SIZE * (k * cases + case)
+        to = 2 * SIZE * (i * cases + case)
+        a = eight(out, at)
+        b = eight(out, at + SIZE)
+        put(out, to, eight(out, to) - factor * a + turned * b)
+        put(out, to + SIZE, eight(out, to + SIZE) - factor * b - turned * a)
 
 
 @kernel
-def substitute_back(k: int, cases: int, plan: Elimination, real: Floats, imaginary: Floats, out: Floats) -> None:
+def substitute_back(k: int, cases: int, plan: Elimination, matrix: Floats, out: Floats) -> None:
     """Find the solution of step k from those of later ones."""
-    x = eight(real, SIZE * plan.diagonal[k])
-    y = eight(imaginary, SIZE * plan.diagonal[k])
+    x = eight(matrix, 2 * SIZE * plan.diagonal[k])
+    y = eight(matrix, 2 * SIZE * plan.diagonal[k] + SIZE)
     for case in range(cases):
         to = 2 * SIZE * (k * cases + case)
         p = eight(out, to)
         q = eight(out, to + SIZE)
-        for j in range(plan.first[k], plan.first[k + 1]):
-            at = SIZE * plan.right[j]
-            known = 2 * SIZE * (plan.later[j] * cases + case)
-            a = eight(real, at)
-            b = eight(imaginary, at)
+        for entry in range(plan.diagonal[k] + 1, plan.first[k + 1]):
+            at = 2 * SIZE * entry
+            known = 2 * SIZE * (plan.column[entry] * cases + case)
+            a = eight(matrix, at)
+            b = eight(matrix, at + SIZE)
             c = eight(out, known)
             d = eight(out, known + SIZE)
             p = p - a * c + b * d
