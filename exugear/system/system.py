@@ -49,7 +49,6 @@ from exugear.system.kernels.turning import (
     TravellingArrays,
     TurningArrays,
     follow,
-    place_travelling,
     share_travelling_forces,
     travelling_memory,
     travelling_tangent,
@@ -419,13 +418,15 @@ class Assembly(ReprMixin):
 
     def mesh_forces(self, q: Floats, v: Floats, meshes: MeshArrays) -> Floats:
         """Generalized forces of meshes, shape (size,), N and N m."""
-        x, u = self.with_travelling(q, v)
+        if not self.travelling.first.size:
+            f = np.zeros(self.size)
+            add_mesh_forces(q, v, meshes, f)
+            return f
+        shares = travelling_memory(self.travelling)
+        (x,), (u,) = follow(q[None], v[None], self.travelling, shares)
         f = np.zeros(x.size)
         add_mesh_forces(x, u, meshes, f)
-        if self.travelling.first.size:
-            shares = travelling_memory(self.travelling)
-            place_travelling(x, u, self.travelling, shares)
-            share_travelling_forces(self.travelling, shares, f)
+        share_travelling_forces(self.travelling, shares, f)
         return f[: self.size]
 
     def mesh_jacobians(self, q: Floats, v: Floats, meshes: MeshArrays | None = None) -> tuple[Floats, Floats]:

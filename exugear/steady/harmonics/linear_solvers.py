@@ -110,7 +110,7 @@ def solve_lines(
 
 
 ROWS_TOGETHER = 8
-"""Rows that stay in fast memory while earlier ones pass: each of these is read from slow memory once for all of them."""
+"""Rows that stay in fast memory while earlier ones pass, which are read from slow memory once for all of them."""
 LEFT_OVER = 1e-10
 """Residual over the load up to which a solution counts as such, both by the sum of all loads."""
 

@@ -26,7 +26,14 @@ from exugear.steady.mean_system.rotating_frame import RotatingFrame
 from exugear.steady.mean_system.symmetric_carriers import SymmetricCarrier, symmetric_carrier
 from exugear.system.bearings.stiffness import load_stands_still, planet_supports, with_equal_planets
 from exugear.system.modes import state_matrix
-from exugear.system.statics import RIGID_BODY_LIMIT, BalanceError, Linearised, linearise, static_state
+from exugear.system.statics import (
+    RIGID_BODY_LIMIT,
+    BalanceError,
+    Linearised,
+    linearise,
+    static_state,
+    tangent_stiffness,
+)
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Complexes, Floats, Integers
 from fe_ste.tools.display import ReprMixin
@@ -428,6 +435,13 @@ def _stiffness(frame: RotatingFrame, psi: float, speed: float, u: Floats) -> Flo
     return _slopes(lambda steps: _residuals(frame, psi, speed, u + steps, None), len(u), step)
 
 
+def _stiffness_at_rest(frame: RotatingFrame, psi: float, u: Floats) -> Floats:
+    """Stiffness (size, size) in the frame about the coordinates u: without what the rotation adds, which is little."""
+    q = frame.state(psi, 0.0, u)[0]
+    t = frame.matrices(psi)[0]
+    return np.asarray(t.T @ tangent_stiffness(frame.assembly, q, frame.mean_meshes) @ t)
+
+
 def place_step(assembly: Assembly) -> float:
     """Step of central differences of forces by places, m and rad."""
     return ROWS_STEP if assembly.has_rows else PLACE_STEP
@@ -494,7 +508,7 @@ def _static(
         best = min(best, error)
         # The elements are all but linear: one matrix serves for several steps.
         if matrix is None or error > 0.1 * before:
-            matrix = np.asarray(np.mean([_stiffness(frame, float(psi), speed, u) for psi in places], axis=0))
+            matrix = np.asarray(np.mean([_stiffness_at_rest(frame, float(psi), u) for psi in places], axis=0))
         before = error
         bordered[:n, :n], bordered[:n, n], bordered[n, pinned] = matrix, -drive * largest, largest
         step = np.linalg.solve(bordered, -np.append(missing, largest * u[pinned]))
@@ -533,7 +547,7 @@ def _changes_over_places(
     curved = any(element.is_curved for element in frame.assembly.elements)
     most = ROWS_VARIATION if frame.assembly.has_rows or curved else VARIATION
     without = frame.without_varying
-    still = stiffness[1] if without is frame else _stiffness(without, 0.0, speed, u)
+    still = stiffness[1] if without is frame else _stiffness_at_rest(without, 0.0, u)
     size = np.sqrt(np.abs(np.diag(stiffness[1])).clip(min=1e-3 * np.abs(np.diag(stiffness[1])).max()))
     for place, psi in enumerate(places[1:].tolist(), start=1):
         masses[place] = _mass(frame, psi, u) - mass
@@ -542,7 +556,7 @@ def _changes_over_places(
             turned = _stiffness(frame, psi, speed, u)
             stiffnesses[:, place] = turned - stiffness[1]
         else:
-            turned = _stiffness(without, psi, speed, u)
+            turned = _stiffness_at_rest(without, psi, u)
             for n in (0, 2):
                 stiffnesses[n, place] = _stiffness(frame, psi, float(speeds[n]), static[n]) - stiffness[n]
             stiffnesses[1, place] = 0.5 * (stiffnesses[0, place] + stiffnesses[2, place])

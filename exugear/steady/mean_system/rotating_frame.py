@@ -30,6 +30,8 @@ PLACES = 4
 """Places of the carrier between one planet's and the next, over which matrices are averaged, at least.
 
 A thousandth of a light resonance's amplitude hangs on it: 5e-6 of a frequency."""
+MOST_KEPT = 16
+"""Angles at which matrices are kept: 3 MB each for the GRC with all bodies flexible."""
 SINGLE_PLACES = 8
 """The same over a revolution where planets are not alike: stiffness has harmonics up to the second."""
 
@@ -159,14 +161,15 @@ class RotatingFrame:
 
     @cached_property
     def _kept(self) -> dict[float, tuple[Jet, Jet]]:
-        """Matrices and kinematic velocities at the last angle: differences use one angle many times."""
+        """Matrices and kinematic velocities at the last angles: differences and means use few angles many times."""
         return {}
 
     def _rotation_at(self, psi: float) -> tuple[Jet, Jet]:
         found = self._kept.get(psi)
         if found is None:
             found = self._matrices(psi), self._rolling(psi)
-            self._kept.clear()
+            if len(self._kept) >= MOST_KEPT:
+                self._kept.clear()
             self._kept[psi] = found
         return found
 

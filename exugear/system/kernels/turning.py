@@ -421,12 +421,15 @@ def share_travelling_forces(seats: TravellingArrays | None, shares: Floats, f: F
             f[o + i] = 0.0
 
 
-def follow(q: Floats, v: Floats, seats: TravellingArrays) -> tuple[Floats, Floats]:
-    """States (n, size + 6 t + 1) with those of the travelling seats and one that stays zero behind (n, size)."""
-    following = ((0, 0), (0, BODY_SIZE * seats.first.size + 1))
-    x = np.pad(q, following)
-    u = np.pad(v, following)
-    place_all(x, u, seats, travelling_memory(seats))
+def follow(q: Floats, v: Floats, seats: TravellingArrays, shares: Floats | None = None) -> tuple[Floats, Floats]:
+    """States (n, size + 6 t + 1) with those of the travelling seats and one that stays zero behind (n, size).
+
+    Memory of `travelling_memory` is left with what each sector shares in the last state.
+    """
+    following = np.zeros((len(q), BODY_SIZE * seats.first.size + 1))
+    x = np.hstack([q, following])
+    u = np.hstack([v, following])
+    place_all(x, u, seats, travelling_memory(seats) if shares is None else shares)
     return x, u
 
 
