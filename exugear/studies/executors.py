@@ -415,7 +415,7 @@ class Pace:
     >>> pace = Pace()
     >>> pace.count
     1
-    >>> pace.learn([0.002, 0.002])
+    >>> pace.took.extend([0.002, 0.002])
     >>> pace.count
     100
     """
@@ -424,18 +424,15 @@ class Pace:
     most = 100
 
     def __init__(self) -> None:
-        self._took: list[float] = []
-
-    def learn(self, seconds: Sequence[float]) -> None:
-        """Record the computing times of points, s."""
-        self._took = [*self._took, *seconds][-2 * self.most :]
+        self.took: deque[float] = deque(maxlen=2 * self.most)
+        """Computing times of the latest points, s."""
 
     @property
     def count(self) -> int:
         """Number of points of the next batch."""
-        if not self._took:
+        if not self.took:
             return 1
-        usual = statistics.median(self._took)  # median, because the first points also load libraries
+        usual = statistics.median(self.took)  # median, because the first points also load libraries
         return max(1, min(self.most, math.floor(self.seconds / max(usual, 1e-9))))
 
 
@@ -518,7 +515,7 @@ class _Running:
                 raise
             self.again(batch)
             return
-        self.pace.learn([record.seconds for record in records])
+        self.pace.took.extend(record.seconds for record in records)
         self.take(records)
 
     def again(self, lost: list[PointInput]) -> None:

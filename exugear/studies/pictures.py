@@ -128,20 +128,18 @@ def _draw_curves(axes: Axes, values: xr.DataArray, along: str, rows: Floats, lab
     for place, n in enumerate(shown):
         style = "-" if place < len(COLOURS) else "--"
         axes.plot(x, rows[n], style, marker=".", color=COLOURS[place % len(COLOURS)], label=labels[n])
-    if x.min() > 0.0 and x.max() / x.min() > WIDE:
-        _logarithmic(axes, "x")
+    _scale(axes, "x", x)
     axes.set_xlabel(_label(values[along]))
     axes.set_ylabel(_label(values))
 
 
-def _logarithmic(axes: Axes, which: Literal["x", "y"]) -> None:
-    """Set a logarithmic scale with numbers as plain text, as the style draws no formulas."""
+def _scale(axes: Axes, which: Literal["x", "y"], values: Floats) -> None:
+    """Set a logarithmic scale for a wide range of values, with numbers as plain text: the style draws no formulas."""
     from matplotlib.ticker import FuncFormatter, NullFormatter
 
-    if which == "x":
-        axes.set_xscale("log")
-    else:
-        axes.set_yscale("log")
+    if not (values.size and values.min() > 0.0 and values.max() / values.min() > WIDE):
+        return
+    axes.set(**{f"{which}scale": "log"})
     axis = axes.xaxis if which == "x" else axes.yaxis
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
@@ -165,9 +163,7 @@ def _draw_bars(axes: Axes, values: xr.DataArray, along: str, rows: Floats, label
         places = np.arange(len(combinations)) + (n - 0.5 * (min(len(labels), MOST_CURVES) - 1)) * width
         axes.bar(places, row, width, color=COLOURS[n % len(COLOURS)], label=label)
     axes.set_xticks(np.arange(len(combinations)), combinations)
-    known = values.to_numpy()[np.isfinite(values.to_numpy())]
-    if known.size and known.min() > 0.0 and known.max() / known.min() > WIDE:
-        _logarithmic(axes, "y")
+    _scale(axes, "y", values.to_numpy()[np.isfinite(values.to_numpy())])
     axes.set_xlabel(along)
     axes.set_ylabel(_label(values))
 
@@ -183,9 +179,7 @@ def _draw_spread(axes: Axes, values: xr.DataArray, along: str, rows: Floats, lab
         axes.plot(_finite(known), share, "-" if n < len(COLOURS) else "--", color=colour, label=label)
         marked = np.quantile(known, MARKED, method="linear" if np.isfinite(known).all() else "higher")
         axes.plot(_finite(marked), MARKED, "o", color=colour, markersize=3.5)
-    spread = values.to_numpy()[np.isfinite(values.to_numpy())]
-    if spread.min() > 0.0 and spread.max() / spread.min() > WIDE:
-        _logarithmic(axes, "x")
+    _scale(axes, "x", values.to_numpy()[np.isfinite(values.to_numpy())])
     axes.set_xlabel(_label(values))
     axes.set_ylabel("fraction of draws below")
     axes.set_ylim(0.0, 1.0)

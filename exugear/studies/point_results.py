@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import filelock
 
@@ -158,7 +158,8 @@ def life_loads(gearbox: Gearbox, choice: Choice) -> CountedLoads:
         Invalid loads, or loads far beyond the tables; strengths that do not fit the gears.
     """
     counted = checked_loads(gearbox)
-    largest = {request.name: max(request.wanted.torque) for request in _requests(gearbox, choice, Path())}
+    requests = requested_tables(gearbox, Path(), grid=_has_axes(choice))
+    largest = {request.name: max(request.wanted.torque) for request in requests}
     check_reach(gearbox, counted, largest)
     return counted
 
@@ -187,12 +188,13 @@ def point_life(
     gearbox = assembly.gearbox
     counted = life_loads(gearbox, choice)
     rating = rating_of(gearbox)
+    grid = _has_axes(choice)
     static = []
-    for request in _requests(gearbox, choice, shared.folder):
-        shared.table(gearbox, request.name, _has_axes(choice), progress)
-        place = shared.results_folder(gearbox, request.name, _has_axes(choice))
-        static += requested_tables(gearbox, place, [request.name], grid=_has_axes(choice))
-    requests = static if _has_axes(choice) else stress_requests(assembly, static, counted, folder)
+    for request in requested_tables(gearbox, shared.folder, grid=grid):
+        shared.table(gearbox, request.name, grid, progress)
+        place = shared.results_folder(gearbox, request.name, grid)
+        static += requested_tables(gearbox, place, [request.name], grid=grid)
+    requests = static if grid else stress_requests(assembly, static, counted, folder)
     stresses = {request.name: shared.stresses(request, progress) for request in requests}
     dynamic = factors(assembly, rating, folder, counted.body)
     tables = {request.name: request.wanted.hash for request in requests}
@@ -200,29 +202,13 @@ def point_life(
     angles = KeptAngles(Store(folder / KEPT_ANGLES, digest))
     life = compute_life(assembly, counted, stresses, dynamic, digest, progress, angles)
     data = to_dataset(life, gearbox.name)
-    return data, [*_doubts(data)]
-
-
-def _doubts(data: xr.Dataset) -> Iterator[str]:
-    """Yield warnings for flanks whose loads are too far beyond their tables."""
-    for label, reach in zip(data["flank"].to_numpy().tolist(), data["flank_reach"].to_numpy().tolist(), strict=True):
-        if reach > UNTRUSTED_REACH:
-            yield f"{label}: the largest torque is {reach:.3g} times the largest torque of its table: stresses invalid"
-
-
-def response_of_factors(
-    assembly: Assembly, choice: Choice, settings: SteadySettings | None, folder: Path, progress: Progress
-) -> None:
-    """Compute the steady-state response for K_v, at the speeds of the study or the default ones."""
-    level = rating_of(assembly.gearbox).dynamic_factor_steady
-    assert level is not None
-    if settings is None or settings.method != level:
-        settings = SteadySettings(usual_speeds(assembly.gearbox), level)
-    stored_or_computed(steady_path(folder, choice, settings), assembly, settings, progress)
-
-
-def _requests(gearbox: Gearbox, choice: Choice, folder: Path) -> list[TableRequest]:
-    return requested_tables(gearbox, folder, grid=_has_axes(choice))
+    reaches = zip(data["flank"].to_numpy().tolist(), data["flank_reach"].to_numpy().tolist(), strict=True)
+    doubts = [
+        f"{label}: the largest torque is {reach:.3g} times the largest torque of its table: stresses invalid"
+        for label, reach in reaches
+        if reach > UNTRUSTED_REACH
+    ]
+    return data, doubts
 
 
 def _has_axes(choice: Choice) -> bool:
@@ -256,6 +242,7 @@ class PointResults:
     """Working folder of a run; removed by `clear`."""
     doubts: list[str] = field(default_factory=list)
     """Warnings about the validity of the results."""
+    _states: dict[tuple[Any, ...], xr.Dataset] = field(default_factory=dict, repr=False)
 
     def table(self, pair: str) -> MeshTable:
         """Return the transmission error table of a pair.
@@ -265,9 +252,12 @@ class PointResults:
         PointError
             There is no such pair.
         """
+        self._check_pair(pair)
+        return self.shared.table(self.gearbox, pair, progress=_ignore_progress)
+
+    def _check_pair(self, pair: str) -> None:
         if pair not in self.gearbox.pairs:
             raise PointError(f"no gear pair {pair!r}; pairs are {', '.join(self.gearbox.pairs)}")
-        return self.shared.table(self.gearbox, pair, progress=_ignore_progress)
 
     @cached_property
     def stiffness(self) -> dict[str, MeshData]:
@@ -371,7 +361,11 @@ class PointResults:
         if rating.dynamic_factor_run is not None:
             self._simulated(replace(self.choice, load_case=rating.dynamic_factor_run))
         elif rating.dynamic_factor_steady is not None:
-            response_of_factors(self.assembly, self.choice, self.settings.steady, self.folder, _ignore_progress)
+            settings = self.settings.steady
+            if settings is None or settings.method != rating.dynamic_factor_steady:
+                settings = SteadySettings(usual_speeds(self.gearbox), rating.dynamic_factor_steady)
+            path = steady_path(self.folder, self.choice, settings)
+            stored_or_computed(path, self.assembly, settings, _ignore_progress)
         data, doubts = point_life(self.assembly, self.choice, self.shared, self.folder, _ignore_progress)
         self.doubts += doubts
         return data
@@ -382,27 +376,17 @@ class PointResults:
         """Return contact states of a pair over loads and misalignments, cached for outputs with the same settings."""
         key = (pair, positions, tuple(torque_factors), tuple(misalignment_um))
         if key not in self._states:
-            self._states[key] = self._computed_states(*key)
+            self._check_pair(pair)
+            wanted = wanted_table(self.gearbox, pair, positions)
+            width = self.gearbox.pairs[pair].pair.face_width
+            self._states[key] = static_transmission_error(
+                prepared_compliance(wanted),
+                [factor * wanted.torque[0] for factor in torque_factors],
+                positions,
+                misalignment=[UM * opening / width for opening in misalignment_um],
+                progress=_ignore_progress,
+            )
         return self._states[key]
-
-    @cached_property
-    def _states(self) -> dict[tuple[str, int, tuple[float, ...], tuple[float, ...]], xr.Dataset]:
-        return {}
-
-    def _computed_states(
-        self, pair: str, positions: int, torque_factors: tuple[float, ...], misalignment_um: tuple[float, ...]
-    ) -> xr.Dataset:
-        if pair not in self.gearbox.pairs:
-            raise PointError(f"no gear pair {pair!r}; pairs are {', '.join(self.gearbox.pairs)}")
-        wanted = wanted_table(self.gearbox, pair, positions)
-        width = self.gearbox.pairs[pair].pair.face_width
-        return static_transmission_error(
-            prepared_compliance(wanted),
-            [factor * wanted.torque[0] for factor in torque_factors],
-            positions,
-            misalignment=[UM * opening / width for opening in misalignment_um],
-            progress=_ignore_progress,
-        )
 
     def clear(self) -> None:
         """Remove the working folder of a run."""
