@@ -602,23 +602,17 @@ class Project(ReprMixin):
         reasons: list[str] = []
         for variant in dict.fromkeys((self.choice.variant, *reversed(OFFERED))):
             other = self.chosen(variant=variant)
-            data, reason = other._fitting_life(counted)
+            if not other.life_path.is_file() or any(request.stored is None for request in other.life_tables()):
+                continue
+            try:
+                data = other.stored_life(counted)
+            except (BalanceError, MeshError, BearingError, VariantError, GearboxFileError) as error:
+                reasons.append(str(error))
+                continue
             if data is not None:
                 return life_results(data), (f"by finite elements, variant {variant}: {other.life_path}",)
-            reasons += [reason] * bool(reason)
+            reasons.append(f"{other.life_path} was computed from another input")
         return {}, ("; ".join([missing, *reasons]),)
-
-    def _fitting_life(self, counted: CountedLoads) -> tuple[xr.Dataset | None, str]:
-        """Return the stored life for these settings; None if none matches, with the reason."""
-        if not self.life_path.is_file() or any(request.stored is None for request in self.life_tables()):
-            return None, ""
-        try:
-            data = self.stored_life(counted)
-        except (BalanceError, MeshError, BearingError, VariantError, GearboxFileError) as error:
-            return None, str(error)
-        if data is None:
-            return None, f"{self.life_path} was computed from another input"
-        return data, ""
 
     def _rated_by_tables(
         self, balance: StaticBalance, begin: Callable[[str], None] | None
@@ -632,13 +626,10 @@ class Project(ReprMixin):
         stresses = pair_stresses(self.requested_tables(), self.folder, begin, keep=False)
         loads = nominal_loads(self.gearbox, rating, rating.application_factor)
         found = nominal_load_values(self.gearbox, rating, loads, balance, stresses)
-        missing = [name for name in self.gearbox.gear_pairs if name not in stresses]
-        lines = (
-            [(f"no finite element results for {', '.join(missing)}: compute tables by `exugear ste`")]
-            if missing
-            else []
-        )
-        return found, (*lines, *stress_warnings(stresses))
+        remarks = list(stress_warnings(stresses))
+        if missing := [name for name in self.gearbox.gear_pairs if name not in stresses]:
+            remarks.insert(0, f"no finite element results for {', '.join(missing)}: compute tables by `exugear ste`")
+        return found, tuple(remarks)
 
     def stored_life(self, counted: CountedLoads) -> xr.Dataset | None:
         """Return the stored life computed from exactly this input; None without one."""
