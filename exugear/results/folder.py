@@ -8,7 +8,7 @@ import logging
 import math
 import sys
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -45,15 +45,14 @@ def stored_source(folder: Path) -> Path | None:
         return None
 
 
-def content_digest(content: Mapping[str, Any]) -> str:
-    """Return a digest of the content of a gearbox file, independent of its formatting."""
+def content_digest(content: Mapping[str, Any] | Sequence[Any]) -> str:
+    """Return the SHA-256 of content such as that of a gearbox file, independent of its formatting."""
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def _checksum(kept: dict[str, Any]) -> str:
     """Checksum of the stored content of a gearbox file, independent of its formatting."""
-    text = json.dumps([kept["source"], kept["content"]], sort_keys=True)
-    return hashlib.sha256(text.encode("utf-8")).hexdigest()
+    return content_digest([kept["source"], kept["content"]])
 
 
 def read_stored_gearbox(folder: Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:

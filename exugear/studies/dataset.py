@@ -63,12 +63,10 @@ def dataset_of(study: Study, records: Mapping[str, Record]) -> xr.Dataset:
         attributes = {"units": kept.units, "long_name": kept.quantity.description}
         attributes["options"] = json.dumps(dict(kept.options))
         variables[name] = ((*dimensions, *own), values, attributes)
-    error, doubts = (np.full(sizes, "", dtype=object) for _ in range(2))
+    error = np.full(sizes, "missing: not computed yet", dtype=object)
+    doubts = np.full(sizes, "", dtype=object)
     seconds, memory = (np.full(sizes, math.nan) for _ in range(2))
-    for index, record in at:
-        if record is None:
-            error[index] = "missing: not computed yet"
-            continue
+    for index, record in done:
         error[index], doubts[index] = record.error, "; ".join(record.doubts)
         seconds[index], memory[index] = record.seconds, record.memory
     variables["error"] = (dimensions, error, {"long_name": "why a point has no results"})
@@ -81,7 +79,13 @@ def dataset_of(study: Study, records: Mapping[str, Record]) -> xr.Dataset:
     }
     coordinates |= {name: (name, np.array(names, dtype=object)) for name, names in labels.items() if names}
     dataset = xr.Dataset(variables, coordinates, _attributes(study, at))
-    return with_slopes(dataset, study) if SIDE in design.shape else dataset
+    if SIDE in design.shape:  # the local derivative of each output by each parameter: the central difference
+        for name, kept in study.outputs.items():
+            below, above = (dataset[name].isel({SIDE: side}) for side in (0, 1))
+            slope = ((above - below) / (2.0 * dataset["step"])).transpose(PARAMETER, ...)
+            slope.attrs = {"units": f"{kept.units} per unit of the parameter", "long_name": f"slope of {name}"}
+            dataset[f"{SLOPE}{name}"] = slope
+    return dataset
 
 
 def _attributes(study: Study, at: list[tuple[tuple[int, ...], Record | None]]) -> dict[str, Any]:
@@ -107,18 +111,6 @@ def _attributes(study: Study, at: list[tuple[tuple[int, ...], Record | None]]) -
         "failed": sum(bool(record.error) for _, record in at if record is not None),
         "missing": sum(record is None for _, record in at),
     }
-
-
-def with_slopes(dataset: xr.Dataset, study: Study) -> xr.Dataset:
-    """Add the local derivative of each output by each parameter: the central difference over two steps."""
-    added = {}
-    for name, kept in study.outputs.items():
-        below, above = (dataset[name].isel({SIDE: side}) for side in (0, 1))
-        slope = (above - below) / (2.0 * dataset["step"])
-        slope = slope.transpose(PARAMETER, ...)
-        slope.attrs = {"units": f"{kept.units} per unit of the parameter", "long_name": f"slope of {name}"}
-        added[f"{SLOPE}{name}"] = slope
-    return dataset.assign(added)
 
 
 def slopes(dataset: xr.Dataset) -> Iterator[tuple[str, str, float]]:

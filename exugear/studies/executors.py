@@ -473,9 +473,20 @@ class _Running:
             The pool has lost its workers; their points are queued again.
         """
         at_work: dict[Future[list[Record]], list[PointInput]] = {}
+        ahead = BATCHES_A_WORKER * pool.workers
         try:
             while self.waiting or self.alone or at_work:
-                self._send(pool, at_work)
+                # Points leave their queue only after they were sent, so that none is lost with its worker.
+                while self.waiting and len(at_work) < ahead:
+                    size = min(self.pace.count, max(1, len(self.waiting) // ahead))
+                    batch = [self.waiting[n] for n in range(size)]
+                    at_work[pool.executor.submit(compute_batch, self.task, batch)] = batch
+                    for _ in batch:
+                        self.waiting.popleft()
+                if self.alone and not at_work:
+                    batch = [self.alone[0]]
+                    at_work[pool.executor.submit(compute_batch, self.task, batch)] = batch
+                    self.alone.popleft()
                 done, _ = wait(at_work, return_when=FIRST_COMPLETED)
                 for future in done:
                     self._gather(future, at_work[future])
@@ -483,19 +494,6 @@ class _Running:
         except BrokenExecutor:
             self.again([work for batch in at_work.values() for work in batch])
             raise
-
-    def _send(self, pool: Pool, at_work: dict[Future[list[Record]], list[PointInput]]) -> None:
-        ahead = BATCHES_A_WORKER * pool.workers
-        while self.waiting and len(at_work) < ahead:
-            size = min(self.pace.count, max(1, len(self.waiting) // ahead))
-            batch = [self.waiting[n] for n in range(size)]
-            at_work[pool.executor.submit(compute_batch, self.task, batch)] = batch
-            for _ in batch:
-                self.waiting.popleft()
-        if self.alone and not at_work:
-            batch = [self.alone[0]]
-            at_work[pool.executor.submit(compute_batch, self.task, batch)] = batch
-            self.alone.popleft()
 
     def _gather(self, future: Future[list[Record]], batch: list[PointInput]) -> None:
         """Take the result of a finished batch.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -23,7 +21,7 @@ from exugear.life.life import UNTRUSTED_REACH, check_reach, checked_loads, compu
 from exugear.life.life_file import to_dataset
 from exugear.life.load_spectrum.counted import CountedLoads
 from exugear.life.static_balance import KeptAngles, stored_table, stress_requests
-from exugear.results.folder import run_directory
+from exugear.results.folder import content_digest, run_directory
 from exugear.results.run_file import load_run
 from exugear.steady.settings import SteadySettings, usual_speeds
 from exugear.steady.steady_file import steady_path, stored_or_computed
@@ -136,15 +134,13 @@ class Shared:
     def bodies(self, gearbox: Gearbox, inertias: str) -> dict[str, ElasticBody]:
         """Return the reduced flexible bodies; computed once, under a lock."""
         related = {key: value for key, value in gearbox.content.items() if key not in UNRELATED}
-        key = hashlib.sha256(json.dumps(related, sort_keys=True).encode()).hexdigest()
         folder = self.folder / "bodies"
-        with _waiting(folder / f"{key[:32]}.lock"):
+        with _waiting(folder / f"{content_digest(related)[:32]}.lock"):
             return reduced_bodies(gearbox, inertias, folder)
 
 
 # Rating and life of one point, as in the command `life`, with shared tables and stresses
 
-Progress = Callable[[int, int], None]
 KEPT_ANGLES = "life.partial.npz"
 """File with the solved carrier angles in the folder of a point, from which an interrupted rating resumes."""
 
@@ -162,53 +158,6 @@ def life_loads(gearbox: Gearbox, choice: Choice) -> CountedLoads:
     largest = {request.name: max(request.wanted.torque) for request in requests}
     check_reach(gearbox, counted, largest)
     return counted
-
-
-def point_life(
-    assembly: Assembly, choice: Choice, shared: Shared, folder: Path, progress: Progress
-) -> tuple[xr.Dataset, list[str]]:
-    """Rate gears and bearings of a point.
-
-    Parameters
-    ----------
-    shared : holds tables of pairs and the stresses from them
-    folder : of the point, with the run or response for K_v
-    progress : called between steps, so that a cancelled computation ends
-
-    Returns
-    -------
-    dataset, list of str
-        As from `exugear.life.life_file.to_dataset`, and warnings about its validity.
-
-    Raises
-    ------
-    GearboxFileError, BalanceError
-        See `exugear.life.life.compute_life`.
-    """
-    gearbox = assembly.gearbox
-    counted = life_loads(gearbox, choice)
-    rating = rating_of(gearbox)
-    grid = _has_axes(choice)
-    static = []
-    for request in requested_tables(gearbox, shared.folder, grid=grid):
-        shared.table(gearbox, request.name, grid, progress)
-        place = shared.results_folder(gearbox, request.name, grid)
-        static += requested_tables(gearbox, place, [request.name], grid=grid)
-    requests = static if grid else stress_requests(assembly, static, counted, folder)
-    stresses = {request.name: shared.stresses(request, progress) for request in requests}
-    dynamic = factors(assembly, rating, folder, counted.body)
-    tables = {request.name: request.wanted.hash for request in requests}
-    digest = life_hash(assembly, counted, tables, source_hash(assembly, rating, folder))
-    angles = KeptAngles(Store(folder / KEPT_ANGLES, digest))
-    life = compute_life(assembly, counted, stresses, dynamic, digest, progress, angles)
-    data = to_dataset(life, gearbox.name)
-    reaches = zip(data["flank"].to_numpy().tolist(), data["flank_reach"].to_numpy().tolist(), strict=True)
-    doubts = [
-        f"{label}: the largest torque is {reach:.3g} times the largest torque of its table: stresses invalid"
-        for label, reach in reaches
-        if reach > UNTRUSTED_REACH
-    ]
-    return data, doubts
 
 
 def _has_axes(choice: Choice) -> bool:
@@ -366,8 +315,28 @@ class PointResults:
                 settings = SteadySettings(usual_speeds(self.gearbox), rating.dynamic_factor_steady)
             path = steady_path(self.folder, self.choice, settings)
             stored_or_computed(path, self.assembly, settings, _ignore_progress)
-        data, doubts = point_life(self.assembly, self.choice, self.shared, self.folder, _ignore_progress)
-        self.doubts += doubts
+        assembly = self.assembly
+        counted = life_loads(assembly.gearbox, self.choice)
+        grid = _has_axes(self.choice)
+        static = []
+        for request in requested_tables(assembly.gearbox, self.shared.folder, grid=grid):
+            self.shared.table(assembly.gearbox, request.name, grid, _ignore_progress)
+            place = self.shared.results_folder(assembly.gearbox, request.name, grid)
+            static += requested_tables(assembly.gearbox, place, [request.name], grid=grid)
+        requests = static if grid else stress_requests(assembly, static, counted, self.folder)
+        stresses = {request.name: self.shared.stresses(request, _ignore_progress) for request in requests}
+        dynamic = factors(assembly, rating, self.folder, counted.body)
+        tables = {request.name: request.wanted.hash for request in requests}
+        digest = life_hash(assembly, counted, tables, source_hash(assembly, rating, self.folder))
+        angles = KeptAngles(Store(self.folder / KEPT_ANGLES, digest))
+        life = compute_life(assembly, counted, stresses, dynamic, digest, _ignore_progress, angles)
+        data = to_dataset(life, assembly.gearbox.name)
+        reaches = zip(data["flank"].to_numpy().tolist(), data["flank_reach"].to_numpy().tolist(), strict=True)
+        self.doubts += [
+            f"{label}: the largest torque is {reach:.3g} times the largest torque of its table: stresses invalid"
+            for label, reach in reaches
+            if reach > UNTRUSTED_REACH
+        ]
         return data
 
     def states(

@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -175,14 +174,10 @@ class _Evaluated:
     task: Task
     opens: Opens
     tell: Progress | None
+    criteria: Criteria
     points: dict[str, EvaluatedPoint] = field(default_factory=dict)
     records: dict[str, Record] = field(default_factory=dict)
     computed: int = 0
-
-    @cached_property
-    def criteria(self) -> Criteria:
-        """Criteria for the points."""
-        return Criteria.of(self.study.file)
 
     def look_at(self, values: Floats) -> list[EvaluatedPoint]:
         """Evaluate parameters (points, parameters); known points are reused."""
@@ -285,7 +280,7 @@ def optimise(
     if wanted is None:
         raise OptimisationError("the study has no section [optimise]")
     with PersistentPool(opens or processes()) as workers:
-        seen = _Evaluated(study, task_of(study, folder), workers.opened, progress)
+        seen = _Evaluated(study, task_of(study, folder), workers.opened, progress, Criteria.of(study.file))
         reference = seen.unchanged_outputs()
         pair = len(wanted.minimise) == 2
         weights = np.linspace(1.0, 0.0, wanted.weightings) if pair and wanted.weightings > 1 else np.array([0.5])

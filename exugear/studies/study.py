@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,7 +19,7 @@ from exugear.gearbox.named_files import NOTHING_MORE, Permissions
 from exugear.gearbox.reading import GearboxFileError, error_line
 from exugear.gearbox.variant import Variant
 from exugear.gearbox.versions import LIFE, MODES, REDUCTION, RUN, STEADY, STUDY
-from exugear.results.folder import case_digest, read_content
+from exugear.results.folder import case_digest, content_digest, read_content
 from exugear.results.sound.radiated_power import radiating_names
 from exugear.steady.mean_system.mean_system import mean_system
 from exugear.steady.mean_system.mesh_waves import mesh_waves
@@ -422,12 +421,11 @@ class Study(ReprMixin):
             "settings": [repr(self.settings.steady), self.settings.duration, self.settings.solver],
             "outputs": self.file.outputs,
         }
-        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+        return content_digest(content)
 
     def hash_of(self, changes: Mapping[str, Any]) -> str:
         """Return the SHA-256 of all input of a point, with values by path in the gearbox file."""
-        text = json.dumps([self.case_hash, changes, self._digests(changes)], sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()
+        return content_digest([self.case_hash, changes, self._digests(changes)])
 
     def hashed_points(self) -> Iterator[tuple[str, Point]]:
         """Yield all points with their hashes."""
