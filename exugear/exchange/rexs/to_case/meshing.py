@@ -50,9 +50,9 @@ class Stage:
     """First of the equal stages, one of which exists for each planet."""
     pinion: int
     gear: int
-    """Centre distance, mm: the specified one, or that of the positions, according to the rules of the import."""
+    """Numbers of the components of both gears."""
     distance: Entry
-    """Centre distance, mm; that of the positions, or the selected one if they differ."""
+    """Centre distance, mm: the specified one, or that of the positions, according to the rules of the import."""
     apart: float
     """Distance of the axes from their positions, mm."""
     common_face: Entry | None = None
