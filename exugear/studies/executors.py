@@ -322,14 +322,14 @@ def processes(workers: int | None = None) -> Opens:
     1
     """
     count = available_cores() if workers is None else workers
+    if count == 1:
+        return lambda: nullcontext(Pool(AtOnce(), 1))
 
     @contextmanager
     def opened() -> Iterator[Pool]:
         with Workers(count) as executor:
             yield Pool(executor, count)
 
-    if count == 1:
-        return lambda: nullcontext(Pool(AtOnce(), 1))
     return opened
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import itertools
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -45,35 +46,27 @@ def draw_study(dataset: xr.Dataset, folder: Path, minimised: tuple[str, ...] = (
     dataset : as `exugear.studies.dataset.dataset_of` makes it
     minimised : outputs minimised by an optimisation, or their percentiles over tolerances
     """
+    pictures: dict[str, Callable[[Figure], None]] = {}
+    if SIDE in dataset.dims:
+        pictures["slopes"] = lambda figure: _draw_ranking(figure, dataset)
+    elif EVALUATION not in dataset.dims:
+        for name, values in dataset.data_vars.items():
+            if name not in _OF_POINTS and np.isfinite(values.to_numpy()).any():
+                pictures[str(name)] = partial(_draw_over_parameters, values=values)
+    elif len(minimised) == 2:
+        pictures["front"] = lambda figure: _draw_front(figure.add_subplot(), dataset, *minimised)
+    else:
+        pictures["search"] = lambda figure: _draw_search(figure.add_subplot(), dataset, minimised[0])
     drawn = []
     with drawing_style():
-        for name, draw in _pictures(dataset, minimised):
-            path = folder / PICTURES / f"{name}.png"
+        for stem, draw in itertools.islice(pictures.items(), MOST_PICTURES):
+            path = folder / PICTURES / f"{stem}.png"
             figure = new_figure(6.4, 4.0)
             figure.suptitle(str(dataset.attrs["title"])[:80], fontsize=9.5)
             draw(figure)
             finish_figure(figure, path)
             drawn.append(path)
-            if len(drawn) == MOST_PICTURES:
-                break
     return drawn
-
-
-def _pictures(dataset: xr.Dataset, minimised: tuple[str, ...]) -> Iterator[tuple[str, Callable[[Figure], None]]]:
-    """Yield the names of the pictures, and the functions that draw them."""
-    if SIDE in dataset.dims:
-        yield "slopes", lambda figure: _draw_ranking(figure, dataset)
-        return
-    if EVALUATION in dataset.dims:
-        if len(minimised) == 2:
-            yield "front", lambda figure: _draw_front(figure.add_subplot(), dataset, *minimised)
-        else:
-            yield "search", lambda figure: _draw_search(figure.add_subplot(), dataset, minimised[0])
-        return
-    for name in dataset.data_vars:
-        values = dataset[name]
-        if name not in _OF_POINTS and np.isfinite(values.to_numpy()).any():
-            yield str(name), partial(_draw_over_parameters, values=values)
 
 
 def _draw_over_parameters(figure: Figure, values: xr.DataArray) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 from exugear.gearbox.renames import STUDY_RENAMES, renamed_hint
 from exugear.gearbox.units import RPM
 from exugear.life.life_file import limits
-from exugear.steady.mean_system.signals import BODY_SPEED, COUPLING_TORQUE, SURFACE_VELOCITY, named_amplitudes
+from exugear.steady.mean_system.signals import SURFACE_VELOCITY, named_amplitudes
 from exugear.steady.peaks import peaks
 from exugear.steady.steady_file import complex_amplitudes
 from exugear.studies.point_results import PointError, PointResults
@@ -588,14 +588,8 @@ class Output:
         if self.quantity.units != AS_SIGNAL:
             return self.quantity.units
         named = str(self.options.get("signal", OVERALL)).split(" ")[0]
-        return next(
-            (
-                signal.units
-                for signal in (*SIGNALS, SURFACE_VELOCITY, COUPLING_TORQUE, BODY_SPEED)
-                if signal.name == named
-            ),
-            "",
-        )
+        signals = (*SIGNALS, SURFACE_VELOCITY)
+        return next((signal.units for signal in signals if signal.name == named), "")
 
     def of(self, results: PointResults) -> Values:
         """Compute the output for a point."""

@@ -355,19 +355,15 @@ def _levels(name: str, parameter: ParameterSection, gearbox: Gearbox) -> _Levels
     return _Levels({name: Axis((name,), labels, units_of(parameter), paths)}, changes)
 
 
-def acting(parameter: ParameterSection, gearbox: Gearbox, path: str, value: Any) -> Any:
-    """Return the new value at a path: the value itself, or the gearbox file's value scaled or shifted by it.
-
-    Raises
-    ------
-    PathError
-        The gearbox file has no number there.
-    """
-    return acted(parameter, own_value(gearbox, path), path, value)
-
-
-def acted(parameter: ParameterSection, own: Any, path: str, value: Any) -> Any:
+def acting(
+    parameter: ParameterSection, gearbox: Gearbox, path: str, value: Any, changes: Mapping[str, Any] | None = None
+) -> Any:
     """Return the new value at a path: the value itself, or the present one scaled or shifted by it.
+
+    Parameters
+    ----------
+    changes : mapping, optional
+        Values by path that precede those of the gearbox file as present ones.
 
     Raises
     ------
@@ -376,6 +372,7 @@ def acted(parameter: ParameterSection, own: Any, path: str, value: Any) -> Any:
     """
     if parameter.acts == "replaces":
         return value
+    own = changes[path] if changes and path in changes else own_value(gearbox, path)
     if isinstance(own, bool) or not isinstance(own, int | float):
         raise PathError(
             f"{path}: the gearbox file has no number there that a value {parameter.acts.rstrip('s')}s; set one in "
@@ -519,13 +516,7 @@ class Tolerances:
             The value to be scaled or shifted is not a number.
         """
         return [
-            {
-                **changes,
-                **{
-                    path: acted(self.acting[path], changes.get(path, own_value(gearbox, path)), path, value)
-                    for path, value in draw.items()
-                },
-            }
+            {**changes, **{path: acting(self.acting[path], gearbox, path, own, changes) for path, own in draw.items()}}
             for draw in self.draws
         ]
 

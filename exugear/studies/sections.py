@@ -331,12 +331,8 @@ def read_study_file(path: Path) -> StudyFile:
     exugear.studies.sections.StudyError: nowhere.study.toml: no such file
     """
     try:
-        text = read_text(path, LARGEST_STUDY)
-    except FileError as error:
-        raise StudyError(str(error)) from None
-    try:
-        content = parsed_toml(text.removeprefix("\ufeff"), str(path))
-    except ValueError as error:
+        content = parsed_toml(read_text(path, LARGEST_STUDY).removeprefix("\ufeff"), str(path))
+    except (FileError, ValueError) as error:
         raise StudyError(str(error)) from None
     return parse_study(content, str(path))
 
