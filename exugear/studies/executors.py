@@ -15,6 +15,7 @@ import os
 import platform
 import re
 import secrets
+import shutil
 import statistics
 import sys
 import time
@@ -107,9 +108,7 @@ def json_number(value: float) -> float | str | None:
         return None
     if math.isfinite(value):
         return value
-    if value > 0.0:
-        return INFINITE
-    return f"-{INFINITE}"
+    return INFINITE if value > 0.0 else f"-{INFINITE}"
 
 
 def number_of(value: Any) -> float:
@@ -258,7 +257,7 @@ def compute_point(task: Task, work: PointInput) -> Record:
             except PointError as reason:  # the other outputs of the point are valid
                 error += f"{'; ' if error else ''}outputs.{name}: {reason}"
         doubts = list(results.doubts)
-        results.clear()
+        shutil.rmtree(folder, ignore_errors=True)
     except WorkerStoppedError:
         raise
     except Exception as reason:  # the failure of one point must not end the others

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -188,7 +187,7 @@ class PointResults:
     settings: PointSettings
     shared: Shared
     folder: Path
-    """Working folder of a run; removed by `clear`."""
+    """Working folder of a run."""
     doubts: list[str] = field(default_factory=list)
     """Warnings about the validity of the results."""
     _states: dict[tuple[Any, ...], xr.Dataset] = field(default_factory=dict, repr=False)
@@ -356,10 +355,6 @@ class PointResults:
                 progress=_ignore_progress,
             )
         return self._states[key]
-
-    def clear(self) -> None:
-        """Remove the working folder of a run."""
-        shutil.rmtree(self.folder, ignore_errors=True)
 
 
 def _ignore_progress(done: int, total: int) -> None:

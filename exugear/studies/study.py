@@ -84,7 +84,7 @@ LIMITS: Mapping[str, tuple[float, float]] = {
 }
 """Minimum and maximum of the options of outputs."""
 SHOWN = 3
-"""Maximum number of equal names listed in a line."""
+"""Maximum number of values of a point that a message lists."""
 ORDER_WORDS = ("x", "+", "-", "rotation", "of", "in")
 """Words in the names of orders beside those of meshes and bodies: ``2 x stage_1``, ``12 x rotation of rotor``."""
 
@@ -142,12 +142,10 @@ def errors_of_paths(study: StudyFile) -> Iterator[str]:
     A tolerance may shift or scale the value of a parameter.
     """
     owners: list[tuple[str, str, str]] = []
-    for table, name, parameter in (
-        *(("parameters", name, parameter) for name, parameter in study.parameters.items()),
-        *(("tolerances", name, tolerance) for name, tolerance in study.tolerances.items()),
-    ):
-        paths = (parameter.path,) if parameter.path else tuple(parameter.paths or parameter.targets)
-        for path in paths:
+    sections = [("parameters", *named) for named in study.parameters.items()]
+    sections += [("tolerances", *named) for named in study.tolerances.items()]
+    for table, name, parameter in sections:
+        for path in parameter.targets:
             for before, owner, other in owners:
                 if not (f"{path}.".startswith(f"{other}.") or f"{other}.".startswith(f"{path}.")):
                     continue
