@@ -446,15 +446,19 @@ BATCHES_A_WORKER = 2
 Tell = Callable[[Record], None]
 
 
+@dataclass
 class _Running:
     """Waiting points, batches of workers, and returned records."""
 
-    def __init__(self, task: Task, points: Iterable[PointInput], tell: Tell) -> None:
-        self.task, self.tell = task, tell
-        self.waiting, self.alone = deque(points), deque[PointInput]()
-        self.losses: Counter[str] = Counter()
-        self.found: dict[str, Record] = {}
-        self.pace = Pace()
+    task: Task
+    tell: Tell
+    waiting: deque[PointInput]
+    alone: deque[PointInput] = field(default_factory=deque)
+    """Points that are computed while no other runs."""
+    losses: Counter[str] = field(default_factory=Counter)
+    """Numbers of worker losses by point."""
+    found: dict[str, Record] = field(default_factory=dict)
+    pace: Pace = field(default_factory=Pace)
 
     def take(self, records: Iterable[Record]) -> None:
         """Store and report returned records."""
@@ -504,16 +508,14 @@ class _Running:
         """
         try:
             records = future.result()
-        except BrokenExecutor:
-            raise
         except (Exception, CancelledError) as error:
             # The loss of its worker only; `BrokenExecutor` is the loss of all.
             if not (isinstance(error, CancelledError) or type(error).__name__ == "KilledWorker"):
                 raise
             self.again(batch)
-            return
-        self.pace.took.extend(record.seconds for record in records)
-        self.take(records)
+        else:
+            self.pace.took.extend(record.seconds for record in records)
+            self.take(records)
 
     def again(self, lost: list[PointInput]) -> None:
         """Queue the unfinished points of lost workers again; abandon points that repeatedly lose their worker."""
@@ -547,7 +549,7 @@ def compute_points(task: Task, points: Iterable[PointInput], opens: Opens, tell:
     OSError
         A finished point cannot be written.
     """
-    running = _Running(task, points, tell)
+    running = _Running(task, tell, deque(points))
     while running.waiting or running.alone:
         with suppress(BrokenExecutor), opens() as pool:
             running.work(pool)

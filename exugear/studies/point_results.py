@@ -190,7 +190,7 @@ class PointResults:
     """Working folder of a run."""
     doubts: list[str] = field(default_factory=list)
     """Warnings about the validity of the results."""
-    _states: dict[tuple[Any, ...], xr.Dataset] = field(default_factory=dict, repr=False)
+    _states: dict[tuple[Any, ...], xr.Dataset] = field(default_factory=dict, init=False, repr=False)
 
     def table(self, pair: str) -> MeshTable:
         """Return the transmission error table of a pair.
