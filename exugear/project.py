@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -264,16 +265,14 @@ class Project(ReprMixin):
 
     def stiffness(self) -> dict[str, MeshData]:
         """Return the mesh stiffness by gear pair for the mesh model; missing tables are computed first."""
+        read = partial(mesh_stiffness, self.gearbox, self.choice.mesh_model, self.folder)
         try:
-            return self._read_stiffness()
+            return dict(read())
         except MeshError:  # the search for missing tables reads the tables again
             if requests := self.missing_tables():
                 self.keep_case()
                 self.computed(requests)
-            return self._read_stiffness()
-
-    def _read_stiffness(self) -> dict[str, MeshData]:
-        return dict(mesh_stiffness(self.gearbox, self.choice.mesh_model, self.folder))
+            return dict(read())
 
     def bodies(self, begin: Callable[[str], None] | None = None) -> dict[str, ElasticBody]:
         """Return the reduced flexible bodies of the variant by name; missing ones are reduced and stored.
