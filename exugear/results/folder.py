@@ -153,18 +153,11 @@ def time_noted(folder: Path, step: str) -> Iterator[None]:
 
 def times_spent(folder: Path) -> tuple[StepTiming, ...]:
     """Last entry of each step, in the order in which the steps were last completed."""
-    last: dict[str, StepTiming] = {}
-    for entry in _lines(folder / TIMES_FILE):
-        last.pop(entry.step, None)
-        last[entry.step] = entry
-    return tuple(last.values())
-
-
-def _lines(path: Path) -> Iterator[StepTiming]:
     try:
-        lines = read_text(path).splitlines()
+        lines = read_text(folder / TIMES_FILE).splitlines()
     except FileError:
-        return  # the list is missing or not readable
+        return ()  # the list is missing or not readable
+    last: dict[str, StepTiming] = {}
     for line in lines:
         try:
             values: dict[str, Any] = json.loads(line)
@@ -173,7 +166,9 @@ def _lines(path: Path) -> Iterator[StepTiming]:
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError, OverflowError):
             continue  # a line truncated by a killed process contains no entry
         if math.isfinite(spent.seconds):
-            yield spent
+            last.pop(spent.step, None)
+            last[spent.step] = spent
+    return tuple(last.values())
 
 
 def run_directory(out: str | Path, choice: Choice) -> Path:

@@ -252,7 +252,7 @@ class VariantRun(ReprMixin):
         """Resonances of all peaks, by frequency, each with its mode."""
         resonances = group_by_frequency(self.picks)
         if self.modes is None:
-            return tuple(Finding(resonance, None, math.nan, "") for resonance in resonances)
+            return tuple(self._finding(resonance, None) for resonance in resonances)
         visible = self._seen_modes(self.modes)
         matches = match_eigenfrequencies(resonances, self.modes["frequency"].to_numpy()[visible])
         return tuple(
