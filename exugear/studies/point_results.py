@@ -358,4 +358,5 @@ class PointResults:
 
 
 def _ignore_progress(done: int, total: int) -> None:
+    """Report no progress, but end a computation that was cancelled."""
     stop_if_asked()

@@ -214,11 +214,9 @@ def check_path(content: Mapping[str, Any], path: str) -> None:
         return
     single = {key for key in permitted if not isinstance(value_at(content, key), Mapping)}
     near = difflib.get_close_matches(path[:200], sorted(single.union(_present(content, ""))), SHOWN_MATCHES)
-    hint = (
-        f"did you mean {' or '.join(near)}?"
-        if near
-        else ("paths are such as bearings.NAME.z_mm, with names of the gearbox file")
-    )
+    hint = "paths are such as bearings.NAME.z_mm, with names of the gearbox file"
+    if near:
+        hint = f"did you mean {' or '.join(near)}?"
     raise PathError(f"no key {path[:200]!r} in the gearbox file; {hint}")
 
 
@@ -237,11 +235,9 @@ def _named(content: Any, pattern: list[str], before: str = "") -> Iterator[str]:
         yield before
         return
     first, *rest = pattern
-    every = list(content) if isinstance(content, Mapping) else []
-    names = every if first == "NAME" else [first]
-    for name in names:
-        inner = content.get(name) if isinstance(content, Mapping) else None
-        yield from _named(inner, rest, f"{before}.{name}" if before else name)
+    entries = content if isinstance(content, Mapping) else {}
+    for name in entries if first == "NAME" else [first]:
+        yield from _named(entries.get(name), rest, f"{before}.{name}" if before else name)
 
 
 MOST_POINTS = 10_000_000
