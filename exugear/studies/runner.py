@@ -189,24 +189,7 @@ class _Evaluated:
                 for path in parameter.targets
             }
             varied.append((row, changes))
-        return self._seen(varied)
-
-    def unchanged_outputs(self) -> Floats:
-        """Return the outputs (outputs,) to be minimised of the unchanged gearbox.
-
-        Raises
-        ------
-        OptimisationError
-            They are not available.
-        """
-        nothing = np.full(len(self.study.file.parameters), math.nan)
-        (looked,) = self._seen([(nothing, {})])
-        found = self.minimised([looked])[0]
-        if not np.isfinite(found).all():
-            records = [self.records[name] for name, _ in looked.draws]
-            reason = next((record.error for record in records if record.error), records[0].values)
-            raise OptimisationError(f"the unchanged gearbox has no results: {reason}")
-        return np.asarray(found)
+        return self.evaluate(varied)
 
     def minimised(self, points: Sequence[EvaluatedPoint]) -> Floats:
         """Return the outputs (points, outputs) to be minimised; infinite where a point failed."""
@@ -227,7 +210,7 @@ class _Evaluated:
         values = np.array([number_of(self.records[name].values.get(output)) for name, _ in point.draws])
         return float(self.criteria.reduce_draws(values, side))
 
-    def _seen(self, varied: list[tuple[Floats, dict[str, Any]]]) -> list[EvaluatedPoint]:
+    def evaluate(self, varied: list[tuple[Floats, dict[str, Any]]]) -> list[EvaluatedPoint]:
         """Evaluate points given by their parameters and the values by path in the gearbox file."""
         tolerances = self.study.tolerances
         wanted = []
@@ -281,7 +264,12 @@ def optimise(
         raise OptimisationError("the study has no section [optimise]")
     with PersistentPool(opens or processes()) as workers:
         seen = _Evaluated(study, task_of(study, folder), workers.opened, progress, Criteria.of(study.file))
-        reference = seen.unchanged_outputs()
+        (unchanged,) = seen.evaluate([(np.full(len(study.file.parameters), math.nan), {})])
+        reference = seen.minimised([unchanged])[0]
+        if not np.isfinite(reference).all():
+            records = [seen.records[name] for name, _ in unchanged.draws]
+            reason = next((record.error for record in records if record.error), records[0].values)
+            raise OptimisationError(f"the unchanged gearbox has no results: {reason}")
         pair = len(wanted.minimise) == 2
         weights = np.linspace(1.0, 0.0, wanted.weightings) if pair and wanted.weightings > 1 else np.array([0.5])
         for number, first in enumerate(weights):
