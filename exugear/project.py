@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -264,16 +265,14 @@ class Project(ReprMixin):
 
     def stiffness(self) -> dict[str, MeshData]:
         """Return the mesh stiffness by gear pair for the mesh model; missing tables are computed first."""
+        read = partial(mesh_stiffness, self.gearbox, self.choice.mesh_model, self.folder)
         try:
-            return self._read_stiffness()
+            return dict(read())
         except MeshError:  # the search for missing tables reads the tables again
             if requests := self.missing_tables():
                 self.keep_case()
                 self.computed(requests)
-            return self._read_stiffness()
-
-    def _read_stiffness(self) -> dict[str, MeshData]:
-        return dict(mesh_stiffness(self.gearbox, self.choice.mesh_model, self.folder))
+            return dict(read())
 
     def bodies(self, begin: Callable[[str], None] | None = None) -> dict[str, ElasticBody]:
         """Return the reduced flexible bodies of the variant by name; missing ones are reduced and stored.
@@ -602,23 +601,17 @@ class Project(ReprMixin):
         reasons: list[str] = []
         for variant in dict.fromkeys((self.choice.variant, *reversed(OFFERED))):
             other = self.chosen(variant=variant)
-            data, reason = other._fitting_life(counted)
+            if not other.life_path.is_file() or any(request.stored is None for request in other.life_tables()):
+                continue
+            try:
+                data = other.stored_life(counted)
+            except (BalanceError, MeshError, BearingError, VariantError, GearboxFileError) as error:
+                reasons.append(str(error))
+                continue
             if data is not None:
                 return life_results(data), (f"by finite elements, variant {variant}: {other.life_path}",)
-            reasons += [reason] * bool(reason)
+            reasons.append(f"{other.life_path} was computed from another input")
         return {}, ("; ".join([missing, *reasons]),)
-
-    def _fitting_life(self, counted: CountedLoads) -> tuple[xr.Dataset | None, str]:
-        """Return the stored life for these settings; None if none matches, with the reason."""
-        if not self.life_path.is_file() or any(request.stored is None for request in self.life_tables()):
-            return None, ""
-        try:
-            data = self.stored_life(counted)
-        except (BalanceError, MeshError, BearingError, VariantError, GearboxFileError) as error:
-            return None, str(error)
-        if data is None:
-            return None, f"{self.life_path} was computed from another input"
-        return data, ""
 
     def _rated_by_tables(
         self, balance: StaticBalance, begin: Callable[[str], None] | None
@@ -632,13 +625,10 @@ class Project(ReprMixin):
         stresses = pair_stresses(self.requested_tables(), self.folder, begin, keep=False)
         loads = nominal_loads(self.gearbox, rating, rating.application_factor)
         found = nominal_load_values(self.gearbox, rating, loads, balance, stresses)
-        missing = [name for name in self.gearbox.gear_pairs if name not in stresses]
-        lines = (
-            [(f"no finite element results for {', '.join(missing)}: compute tables by `exugear ste`")]
-            if missing
-            else []
-        )
-        return found, (*lines, *stress_warnings(stresses))
+        remarks = list(stress_warnings(stresses))
+        if missing := [name for name in self.gearbox.gear_pairs if name not in stresses]:
+            remarks.insert(0, f"no finite element results for {', '.join(missing)}: compute tables by `exugear ste`")
+        return found, tuple(remarks)
 
     def stored_life(self, counted: CountedLoads) -> xr.Dataset | None:
         """Return the stored life computed from exactly this input; None without one."""

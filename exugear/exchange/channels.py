@@ -132,12 +132,21 @@ class Channels(ReprMixin):
         for candidate in (wanted, *same):
             if candidate in lower:
                 return lower.index(candidate)
-        near = difflib.get_close_matches(wanted, lower, n=3, cutoff=0.5)
-        likely = [self.names[lower.index(name)] for name in near] or list(self.names[:SHOWN_NAMES])
-        raise LoadFileError(
-            f"{self.path}: no channel {name!r}; "
-            f"{'names like it are' if near else 'its channels are'} {', '.join(likely)}"
-        )
+        raise LoadFileError(f"{self.path}: no channel {name!r}; {channels_like(name, self.names)}")
+
+
+def channels_like(name: str, known: Sequence[str]) -> str:
+    """Return the channels of a file with a similar name in words, or else its first channels.
+
+    Examples
+    --------
+    >>> channels_like("Torque", ["RotTorq", "RotSpeed"]), channels_like("x", ["RotTorq", "RotSpeed"])
+    ('names like it are RotTorq', 'its channels are RotTorq, RotSpeed')
+    """
+    lower = [own.lower() for own in known]
+    near = difflib.get_close_matches(name.lower(), lower, n=3, cutoff=0.5)
+    likely = [known[lower.index(own)] for own in near] or known[:SHOWN_NAMES]
+    return f"{'names like it are' if near else 'its channels are'} {', '.join(likely)}"
 
 
 @dataclass

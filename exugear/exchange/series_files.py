@@ -16,6 +16,7 @@ import os
 import struct
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import IO, Any
 
@@ -383,10 +384,7 @@ def open_openfast_binary(path: Path) -> Channels:
     except FileError as error:
         raise LoadFileError(str(error)) from None
 
-    def read(places: tuple[int, ...]) -> Iterator[tuple[Floats, Floats]]:
-        return _blocks(path, layout, places)
-
-    return Channels(path, layout.names[1:], layout.units[1:], layout.units[0], read)
+    return Channels(path, layout.names[1:], layout.units[1:], layout.units[0], partial(_blocks, path, layout))
 
 
 def _layout(reader: _Reader) -> _ValueLayout:

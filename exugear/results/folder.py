@@ -8,7 +8,7 @@ import logging
 import math
 import sys
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -45,15 +45,14 @@ def stored_source(folder: Path) -> Path | None:
         return None
 
 
-def content_digest(content: Mapping[str, Any]) -> str:
-    """Return a digest of the content of a gearbox file, independent of its formatting."""
+def content_digest(content: Mapping[str, Any] | Sequence[Any]) -> str:
+    """Return the SHA-256 of content such as that of a gearbox file, independent of its formatting."""
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def _checksum(kept: dict[str, Any]) -> str:
     """Checksum of the stored content of a gearbox file, independent of its formatting."""
-    text = json.dumps([kept["source"], kept["content"]], sort_keys=True)
-    return hashlib.sha256(text.encode("utf-8")).hexdigest()
+    return content_digest([kept["source"], kept["content"]])
 
 
 def read_stored_gearbox(folder: Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:
@@ -154,18 +153,11 @@ def time_noted(folder: Path, step: str) -> Iterator[None]:
 
 def times_spent(folder: Path) -> tuple[StepTiming, ...]:
     """Last entry of each step, in the order in which the steps were last completed."""
-    last: dict[str, StepTiming] = {}
-    for entry in _lines(folder / TIMES_FILE):
-        last.pop(entry.step, None)
-        last[entry.step] = entry
-    return tuple(last.values())
-
-
-def _lines(path: Path) -> Iterator[StepTiming]:
     try:
-        lines = read_text(path).splitlines()
+        lines = read_text(folder / TIMES_FILE).splitlines()
     except FileError:
-        return  # the list is missing or not readable
+        return ()  # the list is missing or not readable
+    last: dict[str, StepTiming] = {}
     for line in lines:
         try:
             values: dict[str, Any] = json.loads(line)
@@ -174,7 +166,9 @@ def _lines(path: Path) -> Iterator[StepTiming]:
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError, OverflowError):
             continue  # a line truncated by a killed process contains no entry
         if math.isfinite(spent.seconds):
-            yield spent
+            last.pop(spent.step, None)
+            last[spent.step] = spent
+    return tuple(last.values())
 
 
 def run_directory(out: str | Path, choice: Choice) -> Path:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -16,8 +16,8 @@ from exugear.gearbox.versions import MODES, REDUCTION, RUN, STEADY, STUDY
 from exugear.results.folder import DATASET, STUDY_LAYOUT
 from exugear.studies.executors import Record, number_of
 from exugear.studies.sampling import PARAMETER, SAMPLE, SIDE, Axis, Design, Point, percentile_of, units_of
-from exugear.studies.sections import LimitSection, StudyFile
-from exugear.studies.study import Study
+from exugear.studies.sections import StudyFile
+from exugear.studies.study import SLOPE, Study
 from fe_ste.tools.arrays import Booleans, Floats
 from fe_ste.tools.stores import load_dataset, write_dataset
 from fe_ste.tools.versions import TABLE
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _PACKAGES = ("exugear", "numpy", "scipy", "numba", "exudyn")
-_LOCAL = "slope_"
-"""Prefix of the name of an output for its local derivative."""
 
 
 def dataset_of(study: Study, records: Mapping[str, Record]) -> xr.Dataset:
@@ -46,65 +44,48 @@ def dataset_of(study: Study, records: Mapping[str, Record]) -> xr.Dataset:
     dimensions = tuple(design.shape)
     at = [(point.index, records.get(name)) for name, point in study.hashed_points()]
     done = [(index, record) for index, record in at if record is not None]
-    variables: dict[str, Any] = {}
     labels: dict[str, list[str]] = {}
     for name, kept in study.outputs.items():
         dimension = kept.quantity.dimension
         if dimension:
             told = [label for _, record in done for label in record.values.get(name, {})]
             labels[dimension] = list(dict.fromkeys([*labels.get(dimension, []), *told]))
+    variables: dict[str, Any] = {}
     for name, kept in study.outputs.items():
-        dimension = kept.quantity.dimension
+        own = [kept.quantity.dimension] if kept.quantity.dimension else []
+        values = np.full((*sizes, *(len(labels[dimension]) for dimension in own)), math.nan)
+        for index, record in done:
+            found = record.values.get(name)
+            if own:
+                values[index] = [number_of((found or {}).get(label)) for label in labels[own[0]]]
+            else:
+                values[index] = number_of(found)
         attributes = {"units": kept.units, "long_name": kept.quantity.description}
         attributes["options"] = json.dumps(dict(kept.options))
-        if dimension:
-            values = _filled(
-                (*sizes, len(labels[dimension])), done, lambda record, n=name, d=dimension: _row(record, n, labels[d])
-            )
-            variables[name] = ((*dimensions, dimension), values, attributes)
-        else:
-            values = _filled(sizes, done, lambda record, n=name: number_of(record.values.get(n)))
-            variables[name] = (dimensions, values, attributes)
-    variables |= _point_variables(dimensions, sizes, at)
+        variables[name] = ((*dimensions, *own), values, attributes)
+    error = np.full(sizes, "missing: not computed yet", dtype=object)
+    doubts = np.full(sizes, "", dtype=object)
+    seconds, memory = (np.full(sizes, math.nan) for _ in range(2))
+    for index, record in done:
+        error[index], doubts[index] = record.error, "; ".join(record.doubts)
+        seconds[index], memory[index] = record.seconds, record.memory
+    variables["error"] = (dimensions, error, {"long_name": "why a point has no results"})
+    variables["doubts"] = (dimensions, doubts, {"long_name": "warnings of a point"})
+    variables["seconds"] = (dimensions, seconds, {"units": "s", "long_name": "wall time of a point"})
+    variables["memory"] = (dimensions, memory, {"units": "B", "long_name": "peak memory of its process so far"})
     coordinates: dict[str, Any] = {
         name: (axis.dimensions, axis.values, {"units": axis.units, "path": axis.path} if axis.path else {})
         for name, axis in design.axes.items()
     }
     coordinates |= {name: (name, np.array(names, dtype=object)) for name, names in labels.items() if names}
     dataset = xr.Dataset(variables, coordinates, _attributes(study, at))
-    return with_slopes(dataset, study) if SIDE in design.shape else dataset
-
-
-def _filled(shape: tuple[int, ...], done: list[tuple[tuple[int, ...], Record]], value: Any) -> Any:
-    values = np.full(shape, math.nan)
-    for index, record in done:
-        values[index] = value(record)
-    return values
-
-
-def _row(record: Record, name: str, labels: list[str]) -> list[float]:
-    value = record.values.get(name) or {}
-    return [number_of(value.get(label)) for label in labels]
-
-
-def _point_variables(
-    dimensions: tuple[str, ...], sizes: tuple[int, ...], at: list[tuple[tuple[int, ...], Record | None]]
-) -> dict[str, Any]:
-    """Return the variables of each point other than outputs: error, warnings, wall time and memory."""
-    error, doubts = (np.full(sizes, "", dtype=object) for _ in range(2))
-    seconds, memory = (np.full(sizes, math.nan) for _ in range(2))
-    for index, record in at:
-        if record is None:
-            error[index] = "missing: not computed yet"
-            continue
-        error[index], doubts[index] = record.error, "; ".join(record.doubts)
-        seconds[index], memory[index] = record.seconds, record.memory
-    return {
-        "error": (dimensions, error, {"long_name": "why a point has no results"}),
-        "doubts": (dimensions, doubts, {"long_name": "warnings of a point"}),
-        "seconds": (dimensions, seconds, {"units": "s", "long_name": "wall time of a point"}),
-        "memory": (dimensions, memory, {"units": "B", "long_name": "peak memory of its process so far"}),
-    }
+    if SIDE in design.shape:  # the local derivative of each output by each parameter: the central difference
+        for name, kept in study.outputs.items():
+            below, above = (dataset[name].isel({SIDE: side}) for side in (0, 1))
+            slope = ((above - below) / (2.0 * dataset["step"])).transpose(PARAMETER, ...)
+            slope.attrs = {"units": f"{kept.units} per unit of the parameter", "long_name": f"slope of {name}"}
+            dataset[f"{SLOPE}{name}"] = slope
+    return dataset
 
 
 def _attributes(study: Study, at: list[tuple[tuple[int, ...], Record | None]]) -> dict[str, Any]:
@@ -132,22 +113,10 @@ def _attributes(study: Study, at: list[tuple[tuple[int, ...], Record | None]]) -
     }
 
 
-def with_slopes(dataset: xr.Dataset, study: Study) -> xr.Dataset:
-    """Add the local derivative of each output by each parameter: the central difference over two steps."""
-    added = {}
-    for name, kept in study.outputs.items():
-        below, above = (dataset[name].isel({SIDE: side}) for side in (0, 1))
-        slope = (above - below) / (2.0 * dataset["step"])
-        slope = slope.transpose(PARAMETER, ...)
-        slope.attrs = {"units": f"{kept.units} per unit of the parameter", "long_name": f"slope of {name}"}
-        added[f"{_LOCAL}{name}"] = slope
-    return dataset.assign(added)
-
-
 def slopes(dataset: xr.Dataset) -> Iterator[tuple[str, str, float]]:
     """Yield output, parameter and relative change per step, for each scalar output with local derivatives."""
     for name in dataset.data_vars:
-        output = str(name).removeprefix(_LOCAL)
+        output = str(name).removeprefix(SLOPE)
         if output == name or dataset[name].ndim > 1:
             continue
         mean = dataset[output].mean(SIDE).to_numpy()
@@ -200,15 +169,6 @@ class EvaluatedPoint:
     draws: tuple[tuple[str, Mapping[str, Any]], ...]
     """Hash and values by path in the gearbox file for each draw of the tolerances; one entry without tolerances."""
 
-    @property
-    def key(self) -> str:
-        """Key of the point: equal parameters give the same point."""
-        return self.draws[0][0]
-
-
-OutputValues = Callable[[EvaluatedPoint, str], Floats]
-"""Function that returns an output for all draws of a point; NaN for failed draws."""
-
 
 @dataclass(frozen=True)
 class Criteria:
@@ -225,8 +185,13 @@ class Criteria:
         """Read the criteria from a study file with a section `optimise`."""
         wanted = study.optimise
         assert wanted is not None
-        limits = tuple(text for name, limit in wanted.limits.items() for text in _limits(name, limit))
-        return cls(tuple(wanted.minimise), limits, wanted.percentile or USUAL_PERCENTILE)
+        limits: list[tuple[str, Side, float]] = []
+        for name, limit in wanted.limits.items():
+            if limit.max is not None:
+                limits.append((name, "high", limit.max))
+            if limit.min is not None:
+                limits.append((name, "low", limit.min))
+        return cls(tuple(wanted.minimise), tuple(limits), wanted.percentile or USUAL_PERCENTILE)
 
     @property
     def sides(self) -> list[tuple[str, Side]]:
@@ -244,27 +209,6 @@ class Criteria:
         if filled.shape[-1] == 1:
             return filled[..., 0]
         return percentile_of(filled, self.percent(side))
-
-    def minimised(self, quantity: OutputValues, points: Sequence[EvaluatedPoint]) -> Floats:
-        """Return the outputs (points, outputs) to be minimised; infinite where a point failed."""
-        found = [[float(self.reduce_draws(quantity(point, name), "high")) for name in self.outputs] for point in points]
-        return np.array(found).reshape(len(points), len(self.outputs))
-
-    def violations(self, quantity: OutputValues, points: Sequence[EvaluatedPoint]) -> Floats:
-        """Return the violations of limits (points, limits), relative to the absolute limit; negative within limits."""
-        found = [
-            [
-                beyond(float(self.reduce_draws(quantity(point, name), side)), side, limit)
-                for name, side, limit in self.limits
-            ]
-            for point in points
-        ]
-        return np.array(found).reshape(len(points), len(self.limits))
-
-
-def _limits(name: str, limit: LimitSection) -> list[tuple[str, Side, float]]:
-    sides: list[tuple[Side, float | None]] = [("high", limit.max), ("low", limit.min)]
-    return [(name, side, value) for side, value in sides if value is not None]
 
 
 def beyond(value: float, side: Side, limit: float) -> float:
@@ -299,12 +243,18 @@ def searched_dataset(
 ) -> xr.Dataset:
     """Return all evaluated points of an optimisation in their order, with the percentiles used as criteria."""
     dataset = dataset_of(replace(study, design=_design(study, points)), records)
-    judged = {side: _judged(dataset, study, criteria, *side) for side in criteria.sides}
+    judged = {}
+    for name, side in criteria.sides:
+        values = dataset[name].to_numpy().reshape(len(points), -1)
+        told = f"{criteria.percent(side):g}th percentile of {name} over {values.shape[1]} draws of the tolerances"
+        told += f" ({study.file.sampling}, seed {study.file.seed}, the same at every point)"
+        attributes = {"units": dataset[name].attrs["units"], "long_name": told}
+        judged[name, side] = ((EVALUATION,), criteria.reduce_draws(values, side), attributes)
     words = {"long_name": "whether all limits are met"}
     kept = np.ones(len(points), dtype=bool)
     for name, side, limit in criteria.limits:
-        kept &= np.array([beyond(float(value), side, limit) <= 0.0 for value in judged[name, side].to_numpy()])
-    outputs = np.array([judged[name, "high"].to_numpy() for name in criteria.outputs]).T
+        kept &= np.array([beyond(float(value), side, limit) <= 0.0 for value in judged[name, side][1]])
+    outputs = np.array([judged[name, "high"][1] for name in criteria.outputs]).T
     front = is_pareto_optimal(np.where(kept[:, None], outputs, np.inf))
     if study.tolerances is not None:
         dataset = dataset.assign({judged_name(study, *side): values for side, values in judged.items()})
@@ -317,17 +267,6 @@ def searched_dataset(
 def judged_name(study: Study, name: str, side: Side) -> str:
     """Return the variable of the dataset used as criterion: the output, or its percentile over the tolerances."""
     return name if study.tolerances is None else f"{name}_{side}"
-
-
-def _judged(dataset: xr.Dataset, study: Study, criteria: Criteria, name: str, side: Side) -> xr.DataArray:
-    """Return an output of each point, or its percentile over tolerances; infinite where draws failed."""
-    import xarray as xr
-
-    values = dataset[name].to_numpy().reshape(dataset.sizes[EVALUATION], -1)
-    told = f"{criteria.percent(side):g}th percentile of {name} over {values.shape[1]} draws of the tolerances"
-    told += f" ({study.file.sampling}, seed {study.file.seed}, the same at every point)"
-    attributes = {"units": dataset[name].attrs["units"], "long_name": told}
-    return xr.DataArray(criteria.reduce_draws(values, side), dims=(EVALUATION,), attrs=attributes)
 
 
 def _design(study: Study, points: Sequence[EvaluatedPoint]) -> Design:

@@ -15,6 +15,7 @@ import os
 import platform
 import re
 import secrets
+import shutil
 import statistics
 import sys
 import time
@@ -107,9 +108,7 @@ def json_number(value: float) -> float | str | None:
         return None
     if math.isfinite(value):
         return value
-    if value > 0.0:
-        return INFINITE
-    return f"-{INFINITE}"
+    return INFINITE if value > 0.0 else f"-{INFINITE}"
 
 
 def number_of(value: Any) -> float:
@@ -258,7 +257,7 @@ def compute_point(task: Task, work: PointInput) -> Record:
             except PointError as reason:  # the other outputs of the point are valid
                 error += f"{'; ' if error else ''}outputs.{name}: {reason}"
         doubts = list(results.doubts)
-        results.clear()
+        shutil.rmtree(folder, ignore_errors=True)
     except WorkerStoppedError:
         raise
     except Exception as reason:  # the failure of one point must not end the others
@@ -322,14 +321,14 @@ def processes(workers: int | None = None) -> Opens:
     1
     """
     count = available_cores() if workers is None else workers
+    if count == 1:
+        return lambda: nullcontext(Pool(AtOnce(), 1))
 
     @contextmanager
     def opened() -> Iterator[Pool]:
         with Workers(count) as executor:
             yield Pool(executor, count)
 
-    if count == 1:
-        return lambda: nullcontext(Pool(AtOnce(), 1))
     return opened
 
 
@@ -415,7 +414,7 @@ class Pace:
     >>> pace = Pace()
     >>> pace.count
     1
-    >>> pace.learn([0.002, 0.002])
+    >>> pace.took.extend([0.002, 0.002])
     >>> pace.count
     100
     """
@@ -424,18 +423,15 @@ class Pace:
     most = 100
 
     def __init__(self) -> None:
-        self._took: list[float] = []
-
-    def learn(self, seconds: Sequence[float]) -> None:
-        """Record the computing times of points, s."""
-        self._took = [*self._took, *seconds][-2 * self.most :]
+        self.took: deque[float] = deque(maxlen=2 * self.most)
+        """Computing times of the latest points, s."""
 
     @property
     def count(self) -> int:
         """Number of points of the next batch."""
-        if not self._took:
+        if not self.took:
             return 1
-        usual = statistics.median(self._took)  # median, because the first points also load libraries
+        usual = statistics.median(self.took)  # median, because the first points also load libraries
         return max(1, min(self.most, math.floor(self.seconds / max(usual, 1e-9))))
 
 
@@ -450,15 +446,19 @@ BATCHES_A_WORKER = 2
 Tell = Callable[[Record], None]
 
 
+@dataclass
 class _Running:
     """Waiting points, batches of workers, and returned records."""
 
-    def __init__(self, task: Task, points: Iterable[PointInput], tell: Tell) -> None:
-        self.task, self.tell = task, tell
-        self.waiting, self.alone = deque(points), deque[PointInput]()
-        self.losses: Counter[str] = Counter()
-        self.found: dict[str, Record] = {}
-        self.pace = Pace()
+    task: Task
+    tell: Tell
+    waiting: deque[PointInput]
+    alone: deque[PointInput] = field(default_factory=deque)
+    """Points that are computed while no other runs."""
+    losses: Counter[str] = field(default_factory=Counter)
+    """Numbers of worker losses by point."""
+    found: dict[str, Record] = field(default_factory=dict)
+    pace: Pace = field(default_factory=Pace)
 
     def take(self, records: Iterable[Record]) -> None:
         """Store and report returned records."""
@@ -476,9 +476,20 @@ class _Running:
             The pool has lost its workers; their points are queued again.
         """
         at_work: dict[Future[list[Record]], list[PointInput]] = {}
+        ahead = BATCHES_A_WORKER * pool.workers
         try:
             while self.waiting or self.alone or at_work:
-                self._send(pool, at_work)
+                # Points leave their queue only after they were sent, so that none is lost with its worker.
+                while self.waiting and len(at_work) < ahead:
+                    size = min(self.pace.count, max(1, len(self.waiting) // ahead))
+                    batch = [self.waiting[n] for n in range(size)]
+                    at_work[pool.executor.submit(compute_batch, self.task, batch)] = batch
+                    for _ in batch:
+                        self.waiting.popleft()
+                if self.alone and not at_work:
+                    batch = [self.alone[0]]
+                    at_work[pool.executor.submit(compute_batch, self.task, batch)] = batch
+                    self.alone.popleft()
                 done, _ = wait(at_work, return_when=FIRST_COMPLETED)
                 for future in done:
                     self._gather(future, at_work[future])
@@ -486,19 +497,6 @@ class _Running:
         except BrokenExecutor:
             self.again([work for batch in at_work.values() for work in batch])
             raise
-
-    def _send(self, pool: Pool, at_work: dict[Future[list[Record]], list[PointInput]]) -> None:
-        ahead = BATCHES_A_WORKER * pool.workers
-        while self.waiting and len(at_work) < ahead:
-            size = min(self.pace.count, max(1, len(self.waiting) // ahead))
-            batch = [self.waiting[n] for n in range(size)]
-            at_work[pool.executor.submit(compute_batch, self.task, batch)] = batch
-            for _ in batch:
-                self.waiting.popleft()
-        if self.alone and not at_work:
-            batch = [self.alone[0]]
-            at_work[pool.executor.submit(compute_batch, self.task, batch)] = batch
-            self.alone.popleft()
 
     def _gather(self, future: Future[list[Record]], batch: list[PointInput]) -> None:
         """Take the result of a finished batch.
@@ -510,16 +508,14 @@ class _Running:
         """
         try:
             records = future.result()
-        except BrokenExecutor:
-            raise
         except (Exception, CancelledError) as error:
             # The loss of its worker only; `BrokenExecutor` is the loss of all.
             if not (isinstance(error, CancelledError) or type(error).__name__ == "KilledWorker"):
                 raise
             self.again(batch)
-            return
-        self.pace.learn([record.seconds for record in records])
-        self.take(records)
+        else:
+            self.pace.took.extend(record.seconds for record in records)
+            self.take(records)
 
     def again(self, lost: list[PointInput]) -> None:
         """Queue the unfinished points of lost workers again; abandon points that repeatedly lose their worker."""
@@ -553,7 +549,7 @@ def compute_points(task: Task, points: Iterable[PointInput], opens: Opens, tell:
     OSError
         A finished point cannot be written.
     """
-    running = _Running(task, points, tell)
+    running = _Running(task, tell, deque(points))
     while running.waiting or running.alone:
         with suppress(BrokenExecutor), opens() as pool:
             running.work(pool)

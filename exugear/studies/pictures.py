@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import itertools
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -45,35 +46,27 @@ def draw_study(dataset: xr.Dataset, folder: Path, minimised: tuple[str, ...] = (
     dataset : as `exugear.studies.dataset.dataset_of` makes it
     minimised : outputs minimised by an optimisation, or their percentiles over tolerances
     """
+    pictures: dict[str, Callable[[Figure], None]] = {}
+    if SIDE in dataset.dims:
+        pictures["slopes"] = lambda figure: _draw_ranking(figure, dataset)
+    elif EVALUATION not in dataset.dims:
+        for name, values in dataset.data_vars.items():
+            if name not in _OF_POINTS and np.isfinite(values.to_numpy()).any():
+                pictures[str(name)] = partial(_draw_over_parameters, values=values)
+    elif len(minimised) == 2:
+        pictures["front"] = lambda figure: _draw_front(figure.add_subplot(), dataset, *minimised)
+    else:
+        pictures["search"] = lambda figure: _draw_search(figure.add_subplot(), dataset, minimised[0])
     drawn = []
     with drawing_style():
-        for name, draw in _pictures(dataset, minimised):
-            path = folder / PICTURES / f"{name}.png"
+        for stem, draw in itertools.islice(pictures.items(), MOST_PICTURES):
+            path = folder / PICTURES / f"{stem}.png"
             figure = new_figure(6.4, 4.0)
             figure.suptitle(str(dataset.attrs["title"])[:80], fontsize=9.5)
             draw(figure)
             finish_figure(figure, path)
             drawn.append(path)
-            if len(drawn) == MOST_PICTURES:
-                break
     return drawn
-
-
-def _pictures(dataset: xr.Dataset, minimised: tuple[str, ...]) -> Iterator[tuple[str, Callable[[Figure], None]]]:
-    """Yield the names of the pictures, and the functions that draw them."""
-    if SIDE in dataset.dims:
-        yield "slopes", lambda figure: _draw_ranking(figure, dataset)
-        return
-    if EVALUATION in dataset.dims:
-        if len(minimised) == 2:
-            yield "front", lambda figure: _draw_front(figure.add_subplot(), dataset, *minimised)
-        else:
-            yield "search", lambda figure: _draw_search(figure.add_subplot(), dataset, minimised[0])
-        return
-    for name in dataset.data_vars:
-        values = dataset[name]
-        if name not in _OF_POINTS and np.isfinite(values.to_numpy()).any():
-            yield str(name), partial(_draw_over_parameters, values=values)
 
 
 def _draw_over_parameters(figure: Figure, values: xr.DataArray) -> None:
@@ -128,20 +121,18 @@ def _draw_curves(axes: Axes, values: xr.DataArray, along: str, rows: Floats, lab
     for place, n in enumerate(shown):
         style = "-" if place < len(COLOURS) else "--"
         axes.plot(x, rows[n], style, marker=".", color=COLOURS[place % len(COLOURS)], label=labels[n])
-    if x.min() > 0.0 and x.max() / x.min() > WIDE:
-        _logarithmic(axes, "x")
+    _scale(axes, "x", x)
     axes.set_xlabel(_label(values[along]))
     axes.set_ylabel(_label(values))
 
 
-def _logarithmic(axes: Axes, which: Literal["x", "y"]) -> None:
-    """Set a logarithmic scale with numbers as plain text, as the style draws no formulas."""
+def _scale(axes: Axes, which: Literal["x", "y"], values: Floats) -> None:
+    """Set a logarithmic scale for a wide range of values, with numbers as plain text: the style draws no formulas."""
     from matplotlib.ticker import FuncFormatter, NullFormatter
 
-    if which == "x":
-        axes.set_xscale("log")
-    else:
-        axes.set_yscale("log")
+    if not (values.size and values.min() > 0.0 and values.max() / values.min() > WIDE):
+        return
+    axes.set(**{f"{which}scale": "log"})
     axis = axes.xaxis if which == "x" else axes.yaxis
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
@@ -165,9 +156,7 @@ def _draw_bars(axes: Axes, values: xr.DataArray, along: str, rows: Floats, label
         places = np.arange(len(combinations)) + (n - 0.5 * (min(len(labels), MOST_CURVES) - 1)) * width
         axes.bar(places, row, width, color=COLOURS[n % len(COLOURS)], label=label)
     axes.set_xticks(np.arange(len(combinations)), combinations)
-    known = values.to_numpy()[np.isfinite(values.to_numpy())]
-    if known.size and known.min() > 0.0 and known.max() / known.min() > WIDE:
-        _logarithmic(axes, "y")
+    _scale(axes, "y", values.to_numpy()[np.isfinite(values.to_numpy())])
     axes.set_xlabel(along)
     axes.set_ylabel(_label(values))
 
@@ -183,9 +172,7 @@ def _draw_spread(axes: Axes, values: xr.DataArray, along: str, rows: Floats, lab
         axes.plot(_finite(known), share, "-" if n < len(COLOURS) else "--", color=colour, label=label)
         marked = np.quantile(known, MARKED, method="linear" if np.isfinite(known).all() else "higher")
         axes.plot(_finite(marked), MARKED, "o", color=colour, markersize=3.5)
-    spread = values.to_numpy()[np.isfinite(values.to_numpy())]
-    if spread.min() > 0.0 and spread.max() / spread.min() > WIDE:
-        _logarithmic(axes, "x")
+    _scale(axes, "x", values.to_numpy()[np.isfinite(values.to_numpy())])
     axes.set_xlabel(_label(values))
     axes.set_ylabel("fraction of draws below")
     axes.set_ylim(0.0, 1.0)

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
-import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import filelock
 
@@ -23,7 +20,7 @@ from exugear.life.life import UNTRUSTED_REACH, check_reach, checked_loads, compu
 from exugear.life.life_file import to_dataset
 from exugear.life.load_spectrum.counted import CountedLoads
 from exugear.life.static_balance import KeptAngles, stored_table, stress_requests
-from exugear.results.folder import run_directory
+from exugear.results.folder import content_digest, run_directory
 from exugear.results.run_file import load_run
 from exugear.steady.settings import SteadySettings, usual_speeds
 from exugear.steady.steady_file import steady_path, stored_or_computed
@@ -136,15 +133,13 @@ class Shared:
     def bodies(self, gearbox: Gearbox, inertias: str) -> dict[str, ElasticBody]:
         """Return the reduced flexible bodies; computed once, under a lock."""
         related = {key: value for key, value in gearbox.content.items() if key not in UNRELATED}
-        key = hashlib.sha256(json.dumps(related, sort_keys=True).encode()).hexdigest()
         folder = self.folder / "bodies"
-        with _waiting(folder / f"{key[:32]}.lock"):
+        with _waiting(folder / f"{content_digest(related)[:32]}.lock"):
             return reduced_bodies(gearbox, inertias, folder)
 
 
 # Rating and life of one point, as in the command `life`, with shared tables and stresses
 
-Progress = Callable[[int, int], None]
 KEPT_ANGLES = "life.partial.npz"
 """File with the solved carrier angles in the folder of a point, from which an interrupted rating resumes."""
 
@@ -158,71 +153,10 @@ def life_loads(gearbox: Gearbox, choice: Choice) -> CountedLoads:
         Invalid loads, or loads far beyond the tables; strengths that do not fit the gears.
     """
     counted = checked_loads(gearbox)
-    largest = {request.name: max(request.wanted.torque) for request in _requests(gearbox, choice, Path())}
+    requests = requested_tables(gearbox, Path(), grid=_has_axes(choice))
+    largest = {request.name: max(request.wanted.torque) for request in requests}
     check_reach(gearbox, counted, largest)
     return counted
-
-
-def point_life(
-    assembly: Assembly, choice: Choice, shared: Shared, folder: Path, progress: Progress
-) -> tuple[xr.Dataset, list[str]]:
-    """Rate gears and bearings of a point.
-
-    Parameters
-    ----------
-    shared : holds tables of pairs and the stresses from them
-    folder : of the point, with the run or response for K_v
-    progress : called between steps, so that a cancelled computation ends
-
-    Returns
-    -------
-    dataset, list of str
-        As from `exugear.life.life_file.to_dataset`, and warnings about its validity.
-
-    Raises
-    ------
-    GearboxFileError, BalanceError
-        See `exugear.life.life.compute_life`.
-    """
-    gearbox = assembly.gearbox
-    counted = life_loads(gearbox, choice)
-    rating = rating_of(gearbox)
-    static = []
-    for request in _requests(gearbox, choice, shared.folder):
-        shared.table(gearbox, request.name, _has_axes(choice), progress)
-        place = shared.results_folder(gearbox, request.name, _has_axes(choice))
-        static += requested_tables(gearbox, place, [request.name], grid=_has_axes(choice))
-    requests = static if _has_axes(choice) else stress_requests(assembly, static, counted, folder)
-    stresses = {request.name: shared.stresses(request, progress) for request in requests}
-    dynamic = factors(assembly, rating, folder, counted.body)
-    tables = {request.name: request.wanted.hash for request in requests}
-    digest = life_hash(assembly, counted, tables, source_hash(assembly, rating, folder))
-    angles = KeptAngles(Store(folder / KEPT_ANGLES, digest))
-    life = compute_life(assembly, counted, stresses, dynamic, digest, progress, angles)
-    data = to_dataset(life, gearbox.name)
-    return data, [*_doubts(data)]
-
-
-def _doubts(data: xr.Dataset) -> Iterator[str]:
-    """Yield warnings for flanks whose loads are too far beyond their tables."""
-    for label, reach in zip(data["flank"].to_numpy().tolist(), data["flank_reach"].to_numpy().tolist(), strict=True):
-        if reach > UNTRUSTED_REACH:
-            yield f"{label}: the largest torque is {reach:.3g} times the largest torque of its table: stresses invalid"
-
-
-def response_of_factors(
-    assembly: Assembly, choice: Choice, settings: SteadySettings | None, folder: Path, progress: Progress
-) -> None:
-    """Compute the steady-state response for K_v, at the speeds of the study or the default ones."""
-    level = rating_of(assembly.gearbox).dynamic_factor_steady
-    assert level is not None
-    if settings is None or settings.method != level:
-        settings = SteadySettings(usual_speeds(assembly.gearbox), level)
-    stored_or_computed(steady_path(folder, choice, settings), assembly, settings, progress)
-
-
-def _requests(gearbox: Gearbox, choice: Choice, folder: Path) -> list[TableRequest]:
-    return requested_tables(gearbox, folder, grid=_has_axes(choice))
 
 
 def _has_axes(choice: Choice) -> bool:
@@ -253,9 +187,10 @@ class PointResults:
     settings: PointSettings
     shared: Shared
     folder: Path
-    """Working folder of a run; removed by `clear`."""
+    """Working folder of a run."""
     doubts: list[str] = field(default_factory=list)
     """Warnings about the validity of the results."""
+    _states: dict[tuple[Any, ...], xr.Dataset] = field(default_factory=dict, init=False, repr=False)
 
     def table(self, pair: str) -> MeshTable:
         """Return the transmission error table of a pair.
@@ -265,9 +200,12 @@ class PointResults:
         PointError
             There is no such pair.
         """
+        self._check_pair(pair)
+        return self.shared.table(self.gearbox, pair, progress=_ignore_progress)
+
+    def _check_pair(self, pair: str) -> None:
         if pair not in self.gearbox.pairs:
             raise PointError(f"no gear pair {pair!r}; pairs are {', '.join(self.gearbox.pairs)}")
-        return self.shared.table(self.gearbox, pair, progress=_ignore_progress)
 
     @cached_property
     def stiffness(self) -> dict[str, MeshData]:
@@ -371,9 +309,33 @@ class PointResults:
         if rating.dynamic_factor_run is not None:
             self._simulated(replace(self.choice, load_case=rating.dynamic_factor_run))
         elif rating.dynamic_factor_steady is not None:
-            response_of_factors(self.assembly, self.choice, self.settings.steady, self.folder, _ignore_progress)
-        data, doubts = point_life(self.assembly, self.choice, self.shared, self.folder, _ignore_progress)
-        self.doubts += doubts
+            settings = self.settings.steady
+            if settings is None or settings.method != rating.dynamic_factor_steady:
+                settings = SteadySettings(usual_speeds(self.gearbox), rating.dynamic_factor_steady)
+            path = steady_path(self.folder, self.choice, settings)
+            stored_or_computed(path, self.assembly, settings, _ignore_progress)
+        assembly = self.assembly
+        counted = life_loads(assembly.gearbox, self.choice)
+        grid = _has_axes(self.choice)
+        static = []
+        for request in requested_tables(assembly.gearbox, self.shared.folder, grid=grid):
+            self.shared.table(assembly.gearbox, request.name, grid, _ignore_progress)
+            place = self.shared.results_folder(assembly.gearbox, request.name, grid)
+            static += requested_tables(assembly.gearbox, place, [request.name], grid=grid)
+        requests = static if grid else stress_requests(assembly, static, counted, self.folder)
+        stresses = {request.name: self.shared.stresses(request, _ignore_progress) for request in requests}
+        dynamic = factors(assembly, rating, self.folder, counted.body)
+        tables = {request.name: request.wanted.hash for request in requests}
+        digest = life_hash(assembly, counted, tables, source_hash(assembly, rating, self.folder))
+        angles = KeptAngles(Store(self.folder / KEPT_ANGLES, digest))
+        life = compute_life(assembly, counted, stresses, dynamic, digest, _ignore_progress, angles)
+        data = to_dataset(life, assembly.gearbox.name)
+        reaches = zip(data["flank"].to_numpy().tolist(), data["flank_reach"].to_numpy().tolist(), strict=True)
+        self.doubts += [
+            f"{label}: the largest torque is {reach:.3g} times the largest torque of its table: stresses invalid"
+            for label, reach in reaches
+            if reach > UNTRUSTED_REACH
+        ]
         return data
 
     def states(
@@ -382,32 +344,19 @@ class PointResults:
         """Return contact states of a pair over loads and misalignments, cached for outputs with the same settings."""
         key = (pair, positions, tuple(torque_factors), tuple(misalignment_um))
         if key not in self._states:
-            self._states[key] = self._computed_states(*key)
+            self._check_pair(pair)
+            wanted = wanted_table(self.gearbox, pair, positions)
+            width = self.gearbox.pairs[pair].pair.face_width
+            self._states[key] = static_transmission_error(
+                prepared_compliance(wanted),
+                [factor * wanted.torque[0] for factor in torque_factors],
+                positions,
+                misalignment=[UM * opening / width for opening in misalignment_um],
+                progress=_ignore_progress,
+            )
         return self._states[key]
-
-    @cached_property
-    def _states(self) -> dict[tuple[str, int, tuple[float, ...], tuple[float, ...]], xr.Dataset]:
-        return {}
-
-    def _computed_states(
-        self, pair: str, positions: int, torque_factors: tuple[float, ...], misalignment_um: tuple[float, ...]
-    ) -> xr.Dataset:
-        if pair not in self.gearbox.pairs:
-            raise PointError(f"no gear pair {pair!r}; pairs are {', '.join(self.gearbox.pairs)}")
-        wanted = wanted_table(self.gearbox, pair, positions)
-        width = self.gearbox.pairs[pair].pair.face_width
-        return static_transmission_error(
-            prepared_compliance(wanted),
-            [factor * wanted.torque[0] for factor in torque_factors],
-            positions,
-            misalignment=[UM * opening / width for opening in misalignment_um],
-            progress=_ignore_progress,
-        )
-
-    def clear(self) -> None:
-        """Remove the working folder of a run."""
-        shutil.rmtree(self.folder, ignore_errors=True)
 
 
 def _ignore_progress(done: int, total: int) -> None:
+    """Report no progress, but end a computation that was cancelled."""
     stop_if_asked()

@@ -5,7 +5,6 @@ Of the planets of a set, the one with the largest damage is rated. A damage or a
 
 from __future__ import annotations
 
-import difflib
 import inspect
 import json
 import math
@@ -18,10 +17,11 @@ import numpy as np
 from exugear.gearbox.renames import STUDY_RENAMES, renamed_hint
 from exugear.gearbox.units import RPM
 from exugear.life.life_file import limits
-from exugear.steady.mean_system.signals import BODY_SPEED, COUPLING_TORQUE, SURFACE_VELOCITY, named_amplitudes
+from exugear.steady.mean_system.signals import SURFACE_VELOCITY, named_amplitudes
 from exugear.steady.peaks import peaks
 from exugear.steady.steady_file import complex_amplitudes
 from exugear.studies.point_results import PointError, PointResults
+from exugear.studies.sections import suggestion
 from exugear.system.modes import FREE_ROTATION, Modes
 from exugear.system.signals import SIGNALS
 from fe_ste.tools.arrays import Floats
@@ -58,10 +58,6 @@ class OutputKind:
         """Description in one line."""
         return (inspect.getdoc(self.function) or "").split("\n")[0]
 
-    def of(self, results: PointResults, options: Mapping[str, Any]) -> Values:
-        """Compute the output for a point."""
-        return self.function(results, **options)
-
     def check(self, name: str, options: Mapping[str, Any]) -> None:
         """Refuse unknown options, options of a wrong type, and missing ones."""
         known = {
@@ -71,8 +67,7 @@ class OutputKind:
         }
         for key, value in options.items():
             if key not in known:
-                near = difflib.get_close_matches(key[:100], known, n=1)
-                hint = f"did you mean {near[0]!r}?" if near else f"its options are {', '.join(known) or 'none'}"
+                hint = suggestion(key, known, f"its options are {', '.join(known) or 'none'}")
                 raise OutputError(f"outputs.{name}.{key}: no such option; {hint}")
             if not _fits(value, str(known[key].annotation)):
                 raise OutputError(f"outputs.{name}.{key} = {value!r}: must be {_WORDS[str(known[key].annotation)]}")
@@ -275,11 +270,12 @@ def _order_amplitudes(results: PointResults, signal: str, orders: list[float], s
 
 def nearest_names(name: str, known: Sequence[str]) -> str:
     """Return the most similar of known names as a question, or else the first twelve of them."""
-    near = difflib.get_close_matches(name[:100], known, n=1)
-    if near:
-        return f"did you mean {near[0]!r}?"
-    shown = ", ".join(known[:12]) or "none"
-    return f"there are {shown}" + (f" and {len(known) - 12} more" if len(known) > 12 else "")
+    return suggestion(name, known, f"there are {listed(known)}")
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return a list of at most twelve names as text."""
+    return (", ".join(names[:12]) or "none") + (f" and {len(names) - 12} more" if len(names) > 12 else "")
 
 
 def _amplitudes(results: PointResults, signal: str) -> Floats:
@@ -429,8 +425,9 @@ def root_damages(results: PointResults) -> dict[str, float]:
 def worst_planets(results: PointResults) -> dict[str, float]:
     """Planet (number) with the largest pitting damage by gear, flank and meshes; NaN for a single body."""
     data = results.life
-    holders = zip(data["flank"].to_numpy().tolist(), data["flank_contact_holder"].to_numpy().tolist(), strict=True)
-    return {str(label): _number_of(str(holder)) for label, holder in holders}
+    numbers = [str(holder).rpartition("_")[2] for holder in data["flank_contact_holder"].to_numpy()]
+    planets = [float(number) if number.isdecimal() else math.nan for number in numbers]
+    return dict(zip(map(str, data["flank"].to_numpy()), planets, strict=True))
 
 
 def contact_safety(results: PointResults, *, gear: str = "", of: str = "life") -> float:
@@ -526,11 +523,6 @@ def _worst(values: Mapping[str, float], part: str, worst: Worst) -> float:
     return worst(known)
 
 
-def _number_of(holder: str) -> float:
-    number = holder.rpartition("_")[2]
-    return float(number) if number.isdecimal() else math.nan
-
-
 # Table of all outputs for study files; a study in Python may add its own
 
 AS_SIGNAL = "as the signal"
@@ -596,18 +588,12 @@ class Output:
         if self.quantity.units != AS_SIGNAL:
             return self.quantity.units
         named = str(self.options.get("signal", OVERALL)).split(" ")[0]
-        return next(
-            (
-                signal.units
-                for signal in (*SIGNALS, SURFACE_VELOCITY, COUPLING_TORQUE, BODY_SPEED)
-                if signal.name == named
-            ),
-            "",
-        )
+        signals = (*SIGNALS, SURFACE_VELOCITY)
+        return next((signal.units for signal in signals if signal.name == named), "")
 
     def of(self, results: PointResults) -> Values:
         """Compute the output for a point."""
-        return self.quantity.of(results, self.options)
+        return self.quantity.function(results, **self.options)
 
 
 def outputs_of(sections: Mapping[str, Mapping[str, Any]], known: Mapping[str, OutputKind]) -> dict[str, Output]:
@@ -634,8 +620,7 @@ def outputs_of(sections: Mapping[str, Mapping[str, Any]], known: Mapping[str, Ou
                 raise OutputError(f"outputs.{name}.{key}: {hint}")
         wanted = str(options.pop("quantity", ""))
         if wanted not in known:
-            near = difflib.get_close_matches(wanted[:100], known, n=1)
-            hint = f"did you mean {near[0]!r}?" if near else f"results are {', '.join(known)}"
+            hint = suggestion(wanted, known, f"results are {', '.join(known)}")
             raise OutputError(f"outputs.{name}.quantity = {wanted!r}: no such result; {hint}")
         known[wanted].check(name, options)
         kept[name] = Output(known[wanted], options)

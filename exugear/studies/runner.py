@@ -12,13 +12,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from exugear.studies.dataset import Criteria, EvaluatedPoint, dataset_of, searched_dataset, write_study
+from exugear.studies.dataset import Criteria, EvaluatedPoint, Side, beyond, dataset_of, searched_dataset, write_study
 from exugear.studies.executors import (
     Opens,
     PersistentPool,
@@ -130,8 +129,8 @@ def run_study(
 
     def tell(record: Record) -> None:
         nonlocal known, failures
-        known = known + 1
-        failures = failures + bool(record.error)
+        known += 1
+        failures += bool(record.error)
         if progress is not None:
             progress(known, failures, len(mine))
 
@@ -175,62 +174,50 @@ class _Evaluated:
     task: Task
     opens: Opens
     tell: Progress | None
+    criteria: Criteria
     points: dict[str, EvaluatedPoint] = field(default_factory=dict)
     records: dict[str, Record] = field(default_factory=dict)
     computed: int = 0
 
-    @cached_property
-    def criteria(self) -> Criteria:
-        """Criteria for the points."""
-        return Criteria.of(self.study.file)
-
     def look_at(self, values: Floats) -> list[EvaluatedPoint]:
         """Evaluate parameters (points, parameters); known points are reused."""
-        return self._seen([self._looked(row, self._changes(row)) for row in values])
-
-    def unchanged_outputs(self) -> Floats:
-        """Return the outputs (outputs,) to be minimised of the unchanged gearbox.
-
-        Raises
-        ------
-        OptimisationError
-            They are not available.
-        """
-        nothing = np.full(len(self.study.file.parameters), math.nan)
-        (looked,) = self._seen([self._looked(nothing, {})])
-        found = self.minimised([looked])[0]
-        if not np.isfinite(found).all():
-            records = [self.records[name] for name, _ in looked.draws]
-            reason = next((record.error for record in records if record.error), records[0].values)
-            raise OptimisationError(f"the unchanged gearbox has no results: {reason}")
-        return np.asarray(found)
+        varied = []
+        for row in values:
+            changes = {
+                path: acting(parameter, self.study.gearbox, path, float(f"{value:.6g}"))
+                for parameter, value in zip(self.study.file.parameters.values(), row, strict=True)
+                for path in parameter.targets
+            }
+            varied.append((row, changes))
+        return self.evaluate(varied)
 
     def minimised(self, points: Sequence[EvaluatedPoint]) -> Floats:
         """Return the outputs (points, outputs) to be minimised; infinite where a point failed."""
-        return self.criteria.minimised(self._figure, points)
+        names = self.criteria.outputs
+        found = [[self._judged(point, name, "high") for name in names] for point in points]
+        return np.array(found).reshape(len(points), len(names))
 
     def violations(self, points: Sequence[EvaluatedPoint]) -> Floats:
         """Return the violations of limits (points, limits), relative to the limit; negative within limits."""
-        return self.criteria.violations(self._figure, points)
+        limits = self.criteria.limits
+        found = [
+            [beyond(self._judged(point, name, side), side, limit) for name, side, limit in limits] for point in points
+        ]
+        return np.array(found).reshape(len(points), len(limits))
 
-    def _figure(self, looked: EvaluatedPoint, output: str) -> Floats:
-        return np.array([number_of(self.records[name].values.get(output)) for name, _ in looked.draws])
+    def _judged(self, point: EvaluatedPoint, output: str, side: Side) -> float:
+        """Return an output of a point, or its percentile over the draws of tolerances."""
+        values = np.array([number_of(self.records[name].values.get(output)) for name, _ in point.draws])
+        return float(self.criteria.reduce_draws(values, side))
 
-    def _changes(self, row: Floats) -> dict[str, Any]:
-        parameters = self.study.file.parameters.values()
-        return {
-            path: acting(parameter, self.study.gearbox, path, float(f"{value:.6g}"))
-            for parameter, value in zip(parameters, row, strict=True)
-            for path in parameter.targets
-        }
-
-    def _looked(self, row: Floats, changes: dict[str, Any]) -> EvaluatedPoint:
+    def evaluate(self, varied: list[tuple[Floats, dict[str, Any]]]) -> list[EvaluatedPoint]:
+        """Evaluate points given by their parameters and the values by path in the gearbox file."""
         tolerances = self.study.tolerances
-        all_changes = [changes] if tolerances is None else tolerances.produced(self.study.gearbox, changes)
-        return EvaluatedPoint(row, tuple((self.study.hash_of(all_change), all_change) for all_change in all_changes))
-
-    def _seen(self, wanted: list[EvaluatedPoint]) -> list[EvaluatedPoint]:
-        self.points |= {looked.key: looked for looked in wanted}
+        wanted = []
+        for row, changes in varied:
+            drawn = [changes] if tolerances is None else tolerances.produced(self.study.gearbox, changes)
+            wanted.append(EvaluatedPoint(row, tuple((self.study.hash_of(draw), draw) for draw in drawn)))
+        self.points |= {looked.draws[0][0]: looked for looked in wanted}  # equal parameters give the same point
         draws = {name: changes for looked in wanted for name, changes in looked.draws}
         unknown = [name for name in draws if name not in self.records]
         if unknown:
@@ -242,18 +229,15 @@ class _Evaluated:
         return wanted
 
     def _report_record(self, record: Record) -> None:
-        if self.tell is not None:
-            failed = sum(bool(record.error) for record in self.records.values()) + bool(record.error)
-            self.tell(len(self.records), failed, self.expected)
-
-    @property
-    def expected(self) -> int:
-        """Maximum number of points of all searches."""
+        """Report the numbers of finished and failed points, and the maximum number of points of all searches."""
         wanted = self.study.file.optimise
-        assert wanted is not None
+        if self.tell is None or wanted is None:
+            return
+        failed = sum(bool(record.error) for record in self.records.values()) + bool(record.error)
         searches = wanted.weightings if len(wanted.minimise) == 2 else 1
         points = 1 + searches * wanted.population * (wanted.generations + 1)
-        return points * (1 if self.study.tolerances is None else len(self.study.tolerances.draws))
+        draws = 1 if self.study.tolerances is None else len(self.study.tolerances.draws)
+        self.tell(len(self.records), failed, points * draws)
 
 
 def optimise(
@@ -279,8 +263,13 @@ def optimise(
     if wanted is None:
         raise OptimisationError("the study has no section [optimise]")
     with PersistentPool(opens or processes()) as workers:
-        seen = _Evaluated(study, task_of(study, folder), workers.opened, progress)
-        reference = seen.unchanged_outputs()
+        seen = _Evaluated(study, task_of(study, folder), workers.opened, progress, Criteria.of(study.file))
+        (unchanged,) = seen.evaluate([(np.full(len(study.file.parameters), math.nan), {})])
+        reference = seen.minimised([unchanged])[0]
+        if not np.isfinite(reference).all():
+            records = [seen.records[name] for name, _ in unchanged.draws]
+            reason = next((record.error for record in records if record.error), records[0].values)
+            raise OptimisationError(f"the unchanged gearbox has no results: {reason}")
         pair = len(wanted.minimise) == 2
         weights = np.linspace(1.0, 0.0, wanted.weightings) if pair and wanted.weightings > 1 else np.array([0.5])
         for number, first in enumerate(weights):
@@ -301,13 +290,16 @@ def _search(seen: _Evaluated, weights: Floats, seed: int) -> None:
     low = np.array([limit.min for limit in limits if limit is not None])
     high = np.array([limit.max for limit in limits if limit is not None])
     begin = low + shares("latin_hypercube", wanted.population, len(low), seed) * (high - low)
-    known = _best(seen, weights, wanted.population // 4)
-    begin[: len(known)] = known
+    known = [point for point in seen.points.values() if np.isfinite(point.row).all()]
+    if known:  # those within all limits first
+        excess = np.maximum(seen.violations(known), 0.0).sum(axis=1)
+        best = np.lexsort((mixed(seen.minimised(known), weights), excess))[: wanted.population // 4]
+        begin[: len(best)] = [known[n].row for n in best]
 
     def objective(columns: Floats, /, *_: Any) -> Any:  # takes all columns at once, which its type does not state
         return mixed(seen.minimised(seen.look_at(np.atleast_2d(columns.T))), weights)
 
-    def beyond(columns: Floats) -> Any:
+    def violations(columns: Floats) -> Any:
         return seen.violations(seen.look_at(np.atleast_2d(columns.T))).T
 
     differential_evolution(
@@ -320,7 +312,7 @@ def _search(seen: _Evaluated, weights: Floats, seed: int) -> None:
         vectorized=True,
         updating="deferred",
         tol=1e-3,
-        constraints=NonlinearConstraint(beyond, -np.inf, 0.0) if seen.criteria.limits else (),
+        constraints=NonlinearConstraint(violations, -np.inf, 0.0) if seen.criteria.limits else (),
     )
 
 
@@ -334,13 +326,3 @@ def mixed(outputs: Floats, weights: Floats) -> Floats:
     """
     weighed = outputs * np.where(weights == 0.0, 1e-12, weights)
     return np.asarray(weighed.max(axis=1) + BLEND * weighed.sum(axis=1))
-
-
-def _best(seen: _Evaluated, weights: Floats, count: int) -> Floats:
-    """Return the parameters (count, parameters) of the best known points, those within all limits first."""
-    points = [looked for looked in seen.points.values() if np.isfinite(looked.row).all()]
-    if not points or not count:
-        return np.zeros((0, len(seen.study.file.parameters)))
-    beyond = np.maximum(seen.violations(points), 0.0).sum(axis=1)
-    order = np.lexsort((mixed(seen.minimised(points), weights), beyond))[:count]
-    return np.array([points[n].row for n in order])

@@ -7,7 +7,7 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -24,14 +24,6 @@ from fe_ste.tools.arrays import Floats
 Sampling = Literal["sobol", "latin_hypercube", "random"]
 _OPEN = 1e-15
 """Minimum distance of a probability from 0 and 1, as a normal distribution is unbounded."""
-
-
-class Distribution(Protocol):
-    """Distribution of draws."""
-
-    def at(self, share: Floats) -> Floats:
-        """Return the quantiles for probabilities (0 to 1)."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -112,9 +104,9 @@ def correlated(independent: Floats, correlation: float) -> Floats:
     True
     """
     members = independent.shape[1]
-    if correlation in (0.0, 1.0) or members == 1:
-        if correlation == 1.0:
-            return np.repeat(independent[:, :1], members, axis=1)
+    if correlation == 1.0:
+        return np.repeat(independent[:, :1], members, axis=1)
+    if correlation == 0.0 or members == 1:
         return independent
     matrix = np.full((members, members), correlation) + (1.0 - correlation) * np.eye(members)
     normal = ndtri(np.clip(independent, _OPEN, 1.0 - _OPEN)) @ np.linalg.cholesky(matrix).T
@@ -171,21 +163,17 @@ def changed(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str,
         *parents, last = path.split(".")
         section: Any = result
         for key in parents:
-            inner = _inner(section, key, path)
+            place = _place(section, key, path)
+            inner = section[place] if isinstance(section, list) else section.get(place, {})
+            if not isinstance(inner, Mapping | list):
+                raise PathError(f"{path}: {key!r} is neither a table nor a list")
             if id(inner) not in copied:
                 inner = list(inner) if isinstance(inner, list) else dict(inner)
                 copied.add(id(inner))
-                section[_place(section, key, path)] = inner
+                section[place] = inner
             section = inner
         section[_place(section, last, path)] = value
     return result
-
-
-def _inner(section: Any, key: str, path: str) -> Any:
-    inner = section[_place(section, key, path)] if isinstance(section, list) else section.get(key, {})
-    if not isinstance(inner, Mapping | list):
-        raise PathError(f"{path}: {key!r} is neither a table nor a list")
-    return inner
 
 
 def _place(section: Any, key: str, path: str) -> Any:
@@ -214,15 +202,21 @@ def check_path(content: Mapping[str, Any], path: str) -> None:
     ...
     exugear.studies.sampling.PathError: no key 'housing.facter' in the gearbox file; did you mean housing.factor?
     """
-    if value_at(content, path) is not None or path in set(_possible(content)):
+    if value_at(content, path) is not None:
         return
-    single = {key for key in _possible(content) if not isinstance(value_at(content, key), Mapping)}
+    permitted = {
+        f"{place}.{key}" if place else key
+        for table, model in tables().items()
+        for place in _named(content, table.split(".") if table else [])
+        for key in model.model_fields
+    }
+    if path in permitted:
+        return
+    single = {key for key in permitted if not isinstance(value_at(content, key), Mapping)}
     near = difflib.get_close_matches(path[:200], sorted(single.union(_present(content, ""))), SHOWN_MATCHES)
-    hint = (
-        f"did you mean {' or '.join(near)}?"
-        if near
-        else ("paths are such as bearings.NAME.z_mm, with names of the gearbox file")
-    )
+    hint = "paths are such as bearings.NAME.z_mm, with names of the gearbox file"
+    if near:
+        hint = f"did you mean {' or '.join(near)}?"
     raise PathError(f"no key {path[:200]!r} in the gearbox file; {hint}")
 
 
@@ -235,24 +229,15 @@ def _present(content: Any, before: str) -> Iterator[str]:
         yield before
 
 
-def _possible(content: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the paths of all keys permitted in the file, for the names that it contains."""
-    for table, model in tables().items():
-        for place in _named(content, table.split(".") if table else []):
-            yield from (f"{place}.{key}" if place else key for key in model.model_fields)
-
-
 def _named(content: Any, pattern: list[str], before: str = "") -> Iterator[str]:
     """Yield the paths of a table, with each existing entry in place of NAME in its pattern."""
     if not pattern:
         yield before
         return
     first, *rest = pattern
-    every = list(content) if isinstance(content, Mapping) else []
-    names = every if first == "NAME" else [first]
-    for name in names:
-        inner = content.get(name) if isinstance(content, Mapping) else None
-        yield from _named(inner, rest, f"{before}.{name}" if before else name)
+    entries = content if isinstance(content, Mapping) else {}
+    for name in entries if first == "NAME" else [first]:
+        yield from _named(entries.get(name), rest, f"{before}.{name}" if before else name)
 
 
 MOST_POINTS = 10_000_000
@@ -323,7 +308,11 @@ def design_of(study: StudyFile, gearbox: Gearbox) -> Design:
     levels = {name: _levels(name, parameter, gearbox) for name, parameter in listed.items()}
     drawn = {name: parameter for name, parameter in study.parameters.items() if parameter.is_drawn}
     if drawn:
-        levels[SAMPLE] = _draws(study, drawn, gearbox)
+        drawn_axes, draws = drawn_values(study, drawn, gearbox)
+        sample = Axis((SAMPLE,), np.arange(1, len(draws) + 1))
+        owners = {path: parameter for parameter in drawn.values() for path in parameter.targets}
+        changes = [{path: acting(owners[path], gearbox, path, value) for path, value in draw.items()} for draw in draws]
+        levels[SAMPLE] = _Levels({SAMPLE: sample, **drawn_axes}, tuple(changes))
     shape = {name: len(level.changes) for name, level in levels.items()}
     total = int(np.prod([float(size) for size in shape.values()]))
     if total > MOST_POINTS:
@@ -344,45 +333,33 @@ def design_of(study: StudyFile, gearbox: Gearbox) -> Design:
 
 
 def _levels(name: str, parameter: ParameterSection, gearbox: Gearbox) -> _Levels:
-    """Return the values of a parameter that lists them."""
+    """Return the values of a parameter that lists them; numbers label themselves, other values are labelled by text."""
+    paths = ", ".join(parameter.targets)
     if parameter.settings is not None:
-        labels = np.array(list(parameter.settings), dtype=object)
-        axis = Axis((name,), labels, "", ", ".join(parameter.targets))
+        axis = Axis((name,), np.array(list(parameter.settings), dtype=object), "", paths)
         return _Levels({name: axis}, tuple(dict(setting) for setting in parameter.settings.values()))
-    values = listed_values(parameter)
+    values = list(parameter.values or [])
+    if parameter.range is not None:
+        spread = np.geomspace if parameter.range.scale == "logarithmic" else np.linspace
+        ends = (parameter.range.first, parameter.range.last)
+        values = [_rounded(value) for value in spread(*ends, parameter.range.count)]
     changes = tuple({path: acting(parameter, gearbox, path, value) for path in parameter.targets} for value in values)
-    labels = _labels(values)
-    return _Levels({name: Axis((name,), labels, units_of(parameter), ", ".join(parameter.targets))}, changes)
-
-
-def listed_values(parameter: ParameterSection) -> list[Any]:
-    """Return the values of a list or a range."""
-    if parameter.range is None:
-        return list(parameter.values or [])
-    spread = np.geomspace if parameter.range.scale == "logarithmic" else np.linspace
-    return [_rounded(value) for value in spread(parameter.range.first, parameter.range.last, parameter.range.count)]
-
-
-def _labels(values: list[Any]) -> Any:
-    """Return numbers as they are, and other values as text."""
     if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
-        return np.array(values, dtype=np.float64)
-    return np.array([value if isinstance(value, str) else str(value) for value in values], dtype=object)
+        labels = np.array(values, dtype=np.float64)
+    else:
+        labels = np.array([str(value) for value in values], dtype=object)
+    return _Levels({name: Axis((name,), labels, units_of(parameter), paths)}, changes)
 
 
-def acting(parameter: ParameterSection, gearbox: Gearbox, path: str, value: Any) -> Any:
-    """Return the new value at a path: the value itself, or the gearbox file's value scaled or shifted by it.
-
-    Raises
-    ------
-    PathError
-        The gearbox file has no number there.
-    """
-    return acted(parameter, own_value(gearbox, path), path, value)
-
-
-def acted(parameter: ParameterSection, own: Any, path: str, value: Any) -> Any:
+def acting(
+    parameter: ParameterSection, gearbox: Gearbox, path: str, value: Any, changes: Mapping[str, Any] | None = None
+) -> Any:
     """Return the new value at a path: the value itself, or the present one scaled or shifted by it.
+
+    Parameters
+    ----------
+    changes : mapping, optional
+        Values by path that precede those of the gearbox file as present ones.
 
     Raises
     ------
@@ -391,6 +368,7 @@ def acted(parameter: ParameterSection, own: Any, path: str, value: Any) -> Any:
     """
     if parameter.acts == "replaces":
         return value
+    own = changes[path] if changes and path in changes else own_value(gearbox, path)
     if isinstance(own, bool) or not isinstance(own, int | float):
         raise PathError(
             f"{path}: the gearbox file has no number there that a value {parameter.acts.rstrip('s')}s; set one in "
@@ -423,15 +401,6 @@ def units_of(parameter: ParameterSection) -> str:
     return units.pop() if len(units) == 1 else ""
 
 
-def _draws(study: StudyFile, drawn: Mapping[str, ParameterSection], gearbox: Gearbox) -> _Levels:
-    """Return the values of all parameters with distributions, drawn together."""
-    axes, draws = drawn_values(study, drawn, gearbox)
-    axes = {SAMPLE: Axis((SAMPLE,), np.arange(1, len(draws) + 1)), **axes}
-    owners = {path: parameter for parameter in drawn.values() for path in parameter.targets}
-    changes = [{path: acting(owners[path], gearbox, path, value) for path, value in draw.items()} for draw in draws]
-    return _Levels(axes, tuple(changes))
-
-
 def drawn_values(
     study: StudyFile, drawn: Mapping[str, ParameterSection], gearbox: Gearbox
 ) -> tuple[dict[str, Axis], list[dict[str, float]]]:
@@ -452,27 +421,20 @@ def drawn_values(
         columns = cube[:, first : first + members[name]]
         first += members[name]
         values = distribution_of(parameter, gearbox).at(correlated(columns, parameter.correlation))
-        axes |= _drawn_axes(name, parameter, values)
+        labels = units_of(parameter), ", ".join(parameter.targets)
+        if values.shape[1] == 1:
+            axes[name] = Axis((SAMPLE,), values[:, 0], *labels)
+        else:  # drawn separately for each path
+            member = f"{name}_path"
+            axes[member] = Axis((member,), np.array(parameter.targets, dtype=object))
+            axes[name] = Axis((SAMPLE, member), values, *labels)
         for n, row in enumerate(values):
             for m, path in enumerate(parameter.targets):
                 draws[n][path] = _rounded(float(row[min(m, len(row) - 1)]))
     return axes, draws
 
 
-def _drawn_axes(name: str, parameter: ParameterSection, values: Floats) -> dict[str, Axis]:
-    """Return the coordinates of a drawn parameter: over the draws, and over its paths if drawn separately."""
-    units = units_of(parameter)
-    paths = ", ".join(parameter.targets)
-    if values.shape[1] == 1:
-        return {name: Axis((SAMPLE,), values[:, 0], units, paths)}
-    member = f"{name}_path"
-    return {
-        member: Axis((member,), np.array(parameter.targets, dtype=object)),
-        name: Axis((SAMPLE, member), values, units, paths),
-    }
-
-
-def distribution_of(parameter: ParameterSection, gearbox: Gearbox) -> Distribution:
+def distribution_of(parameter: ParameterSection, gearbox: Gearbox) -> Normal | Uniform:
     """Return the distribution of a parameter.
 
     Raises
@@ -550,13 +512,7 @@ class Tolerances:
             The value to be scaled or shifted is not a number.
         """
         return [
-            {
-                **changes,
-                **{
-                    path: acted(self.acting[path], changes.get(path, own_value(gearbox, path)), path, value)
-                    for path, value in draw.items()
-                },
-            }
+            {**changes, **{path: acting(self.acting[path], gearbox, path, own, changes) for path, own in draw.items()}}
             for draw in self.draws
         ]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Collection
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -307,6 +308,7 @@ class StudyFile(StudyPart):
 LARGEST_STUDY = 10_000_000
 """Largest study file that is read, bytes."""
 SHOWN_ERRORS = 20
+"""Maximum number of errors that a message shows."""
 
 
 class StudyError(ValueError):
@@ -329,12 +331,8 @@ def read_study_file(path: Path) -> StudyFile:
     exugear.studies.sections.StudyError: nowhere.study.toml: no such file
     """
     try:
-        text = read_text(path, LARGEST_STUDY)
-    except FileError as error:
-        raise StudyError(str(error)) from None
-    try:
-        content = parsed_toml(text.removeprefix("\ufeff"), str(path))
-    except ValueError as error:
+        content = parsed_toml(read_text(path, LARGEST_STUDY).removeprefix("\ufeff"), str(path))
+    except (FileError, ValueError) as error:
         raise StudyError(str(error)) from None
     return parse_study(content, str(path))
 
@@ -371,6 +369,12 @@ def parse_study(content: dict[str, Any], source: str) -> StudyFile:
     raise StudyError("\n".join([*lines[:SHOWN_ERRORS], *more]))
 
 
+def suggestion(name: str, known: Collection[str], otherwise: str) -> str:
+    """Return the most similar of known names as a question, or else another hint."""
+    near = difflib.get_close_matches(name[:100], known, n=1)
+    return f"did you mean {near[0]!r}?" if near else otherwise
+
+
 _REMEDIES = {
     "missing": "this key is missing",
     "float_type": "must be a number",
@@ -390,11 +394,13 @@ def _described(error: Any) -> str:
     if error["type"] == "extra_forbidden":
         if hint := renamed_hint(location, STUDY_RENAMES):
             return f"{key}: {hint}"
-        known = _known_keys(location[:-1])
-        near = difflib.get_close_matches(location[-1][:100], known, n=1)
-        return f"{key}: unknown key; " + (
-            f"did you mean {near[0]!r}?" if near else f"known keys are {', '.join(known)}"
-        )
+        section: Any = StudyFile  # which contains the unknown key
+        for part in location[:-1]:
+            fields = getattr(section, "model_fields", {})
+            kind = fields[part].annotation if part in fields else section
+            section = next((model for model in _models(kind)), section)
+        known = list(getattr(section, "model_fields", {}))
+        return f"{key}: unknown key; " + suggestion(location[-1], known, f"known keys are {', '.join(known)}")
     remedy = _REMEDIES.get(error["type"])
     if error["type"] == "literal_error":
         remedy = one_of(error["ctx"]["expected"], error["input"])
@@ -406,16 +412,7 @@ def _described(error: Any) -> str:
     return f"{key}{shown}: {remedy}"
 
 
-def _known_keys(location: list[str]) -> list[str]:
-    """Return the keys of the table at a location in the file."""
-    section: Any = StudyFile
-    for part in location:
-        fields = getattr(section, "model_fields", {})
-        kind = fields[part].annotation if part in fields else section
-        section = next((model for model in _models(kind)), section)
-    return list(getattr(section, "model_fields", {}))
-
-
 def _models(kind: Any) -> list[Any]:
+    """Return a section and all sections in its type arguments."""
     own = [kind] if hasattr(kind, "model_fields") else []
     return own + [model for part in getattr(kind, "__args__", ()) for model in _models(part)]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import itertools
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -21,7 +19,7 @@ from exugear.gearbox.named_files import NOTHING_MORE, Permissions
 from exugear.gearbox.reading import GearboxFileError, error_line
 from exugear.gearbox.variant import Variant
 from exugear.gearbox.versions import LIFE, MODES, REDUCTION, RUN, STEADY, STUDY
-from exugear.results.folder import case_digest, read_content
+from exugear.results.folder import case_digest, content_digest, read_content
 from exugear.results.sound.radiated_power import radiating_names
 from exugear.steady.mean_system.mean_system import mean_system
 from exugear.steady.mean_system.mesh_waves import mesh_waves
@@ -38,6 +36,7 @@ from exugear.studies.quantities import (
     Output,
     OutputError,
     OutputKind,
+    listed,
     nearest_names,
     outputs_of,
 )
@@ -85,7 +84,9 @@ LIMITS: Mapping[str, tuple[float, float]] = {
 }
 """Minimum and maximum of the options of outputs."""
 SHOWN = 3
-"""Maximum number of equal names listed in a line."""
+"""Maximum number of values of a point that a message lists."""
+ORDER_WORDS = ("x", "+", "-", "rotation", "of", "in")
+"""Words in the names of orders beside those of meshes and bodies: ``2 x stage_1``, ``12 x rotation of rotor``."""
 
 
 def errors_of_names(study: StudyFile, kept: Mapping[str, Output]) -> Iterator[str]:
@@ -141,12 +142,10 @@ def errors_of_paths(study: StudyFile) -> Iterator[str]:
     A tolerance may shift or scale the value of a parameter.
     """
     owners: list[tuple[str, str, str]] = []
-    for table, name, parameter in (
-        *(("parameters", name, parameter) for name, parameter in study.parameters.items()),
-        *(("tolerances", name, tolerance) for name, tolerance in study.tolerances.items()),
-    ):
-        paths = (parameter.path,) if parameter.path else tuple(parameter.paths or parameter.targets)
-        for path in paths:
+    sections = [("parameters", *named) for named in study.parameters.items()]
+    sections += [("tolerances", *named) for named in study.tolerances.items()]
+    for table, name, parameter in sections:
+        for path in parameter.targets:
             for before, owner, other in owners:
                 if not (f"{path}.".startswith(f"{other}.") or f"{other}.".startswith(f"{path}.")):
                     continue
@@ -189,7 +188,7 @@ def errors_of_options(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choi
             if not all(low <= entry <= high and math.isfinite(entry) for entry in numbers):
                 yield f"outputs.{name}.{key} = {value!r}: must be finite, and lie between {low:g} and {high:g}"
             elif key in known and value and value not in known[key]:
-                yield f"outputs.{name}.{key} = {str(value)[:200]!r}: no such {key}; there are {_listed(known[key])}"
+                yield f"outputs.{name}.{key} = {str(value)[:200]!r}: no such {key}; there are {listed(known[key])}"
         options = output.options
         if options.get("from_Hz", 0.0) > options.get("to_Hz", math.inf):
             yield f"outputs.{name}.from_Hz = {options['from_Hz']:g}: must be below to_Hz = {options['to_Hz']:g}"
@@ -229,7 +228,7 @@ def errors_of_signals(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choi
         "body": turning_bodies(gearbox, [body.name for body in gearbox.bodies() if not body.fixed]),
     }
     named_parts = [f"{own.name} {part}" for own in of_runs for part in parts.get(own.dimensions[-1], ())]
-    families = [mesh.family for mesh in gearbox.meshes]
+    in_orders = [*(mesh.family for mesh in gearbox.meshes), *(body.name for body in gearbox.bodies())]
     named = [output.options.get("signal", OVERALL) for output in kept.values() if output.quantity.needs == "steady"]
     steady = _steady_signals(gearbox, choice) if any(signal != OVERALL for signal in named) else []
     for name, output in kept.items():
@@ -238,13 +237,20 @@ def errors_of_signals(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choi
             single = output.quantity.dimension != ""
             known = [of_run.name for of_run in of_runs if not single or len(of_run.dimensions) == 1]
             if signal not in known and signal not in named_parts:
-                yield f"outputs.{name}.signal = {signal[:200]!r}: no such signal; there are {_listed(known)}"
+                yield f"outputs.{name}.signal = {signal[:200]!r}: no such signal; there are {listed(known)}"
         elif output.quantity.needs == "steady":
             if signal != OVERALL and named_amplitudes(steady, np.zeros(len(steady), complex), signal) is None:
                 places = dict.fromkeys(" ".join(name.split(" ")[:2]) for name in steady)
                 known = [*places, *(name for name in steady if name not in places)]
                 yield f"outputs.{name}.signal = {signal[:200]!r}: no such signal; {nearest_names(signal, known)}"
-            yield from _errors_of_line(name, output, [*families, *(body.name for body in gearbox.bodies())])
+            line = output.options.get("line")
+            words = str(line).split()
+            unknown = [word for word in words if not word.isdecimal() and word not in (*ORDER_WORDS, *in_orders)]
+            if line is not None and (unknown or not line):
+                yield (
+                    f"outputs.{name}.line = {str(line)[:200]!r}: no such order; orders are such as {in_orders[0]} and "
+                    f"2 x {in_orders[0]}, of {listed(list(dict.fromkeys(in_orders)))}"
+                )
 
 
 def _steady_signals(gearbox: Gearbox, choice: Choice) -> list[str]:
@@ -261,20 +267,6 @@ def _steady_signals(gearbox: Gearbox, choice: Choice) -> list[str]:
         names = [signal.name for signal in (*rows, *mesh_signal_names(mesh_waves(system)))]
         return [*names, SURFACE_VELOCITY.name] if radiating_names(gearbox, choice.variant) else names
     return []
-
-
-ORDER_WORDS = ("x", "+", "-", "rotation", "of", "in")
-"""Words in the names of orders beside those of meshes and bodies: ``2 x stage_1``, ``12 x rotation of rotor``."""
-
-
-def _errors_of_line(name: str, output: Output, parts: Sequence[str]) -> Iterator[str]:
-    line = output.options.get("line")
-    unknown = [word for word in str(line).split() if not word.isdecimal() and word not in (*ORDER_WORDS, *parts)]
-    if line is not None and (unknown or not line):
-        yield (
-            f"outputs.{name}.line = {str(line)[:200]!r}: no such order; orders are such as {parts[0]} and 2 x "
-            f"{parts[0]}, of {_listed(list(dict.fromkeys(parts)))}"
-        )
 
 
 def _rated_bearings(gearbox: Gearbox) -> list[str]:
@@ -303,12 +295,6 @@ def _names(gearbox: Gearbox, choice: Choice) -> dict[str, Sequence[str]]:
         "of": list(SAFETIES),
         "by": [MINIMUM, *LIVES],
     }
-
-
-def _listed(names: Sequence[str]) -> str:
-    """Return a list of at most twelve names as text."""
-    shown = list(itertools.islice(names, 12))
-    return (", ".join(shown) or "none") + (f" and {len(names) - len(shown)} more" if len(names) > len(shown) else "")
 
 
 @dataclass(frozen=True)
@@ -383,7 +369,10 @@ class Study(ReprMixin):
             for table in ("parameters", "tolerances"):
                 for name, parameter in getattr(file, table).items():
                     for path in parameter.targets:
-                        _guarded(f"{table}.{name}", check_path, gearbox.content, path)
+                        try:
+                            check_path(gearbox.content, path)
+                        except PathError as error:
+                            raise PathError(f"{table}.{name}: {error}") from None
             design = design_of(file, gearbox) if file.optimise is None else Design({}, {}, ())
             tolerances = tolerances_of(file, gearbox)
             kept = outputs_of(file.outputs, quantities)
@@ -430,12 +419,11 @@ class Study(ReprMixin):
             "settings": [repr(self.settings.steady), self.settings.duration, self.settings.solver],
             "outputs": self.file.outputs,
         }
-        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+        return content_digest(content)
 
     def hash_of(self, changes: Mapping[str, Any]) -> str:
         """Return the SHA-256 of all input of a point, with values by path in the gearbox file."""
-        text = json.dumps([self.case_hash, changes, self._digests(changes)], sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()
+        return content_digest([self.case_hash, changes, self._digests(changes)])
 
     def hashed_points(self) -> Iterator[tuple[str, Point]]:
         """Yield all points with their hashes."""
@@ -451,13 +439,6 @@ class Study(ReprMixin):
             with suppress(ValueError, NotImplementedError, OSError):  # an invalid pattern is refused where it is read
                 files += sorted(folder.glob(pattern))
         return [file_digest(file) for file in files if file.suffix and file.is_file()]
-
-
-def _guarded(key: str, check: Any, *arguments: Any) -> None:
-    try:
-        check(*arguments)
-    except PathError as error:
-        raise PathError(f"{key}: {error}") from None
 
 
 def _texts(content: Any) -> Iterator[str]:

@@ -72,13 +72,13 @@ def read_hdf5(path: Path, wanted: Sequence[str] | None = None) -> Recording:
             _check_size(path, name, found[name], size)
         axes = [_time(path, name, signals[name], times) for name in chosen]
         rate = common_rate(path, chosen, [rate for rate, _ in axes])
-        channels = [RecordedChannel(name, _text(signals[name], _UNITS), _values(signals[name])) for name in chosen]
+        channels = [RecordedChannel(name, _unit(signals[name]), _values(signals[name])) for name in chosen]
     return recording_of(path, rate, axes[0][1], channels)
 
 
 def _is_time(name: str, data: h5py.Dataset) -> bool:
     """Return whether a dataset has the times of samples, by name and unit: T in N m is a channel."""
-    unit = unit_of(_text(data, _UNITS).partition(" since ")[0] or "s", any_case=True)
+    unit = unit_of(_unit(data).partition(" since ")[0] or "s", any_case=True)
     return name.rpartition("/")[2].lower() in TIMES and (unit is None or unit.quantity == "time")
 
 
@@ -142,9 +142,9 @@ def _time(path: Path, name: str, data: h5py.Dataset, times: dict[str, h5py.Datas
             f"{path}: dataset {name} has no time axis of its length and no sampling rate; add a dataset time in s, or "
             f"the attribute {RATES[0]} in Hz"
         )
-    unit = unit_of(_text(times[axis], _UNITS).partition(" since ")[0] or "s", any_case=True)
+    unit = unit_of(_unit(times[axis]).partition(" since ")[0] or "s", any_case=True)
     if unit is None or unit.quantity != "time":
-        raise RecordingError(f"{path}: dataset {axis} has the unit {_text(times[axis], _UNITS)!r}; expected s or ms")
+        raise RecordingError(f"{path}: dataset {axis} has the unit {_unit(times[axis])!r}; expected s or ms")
     seconds = unit.factor * _values(times[axis])
     return even_rate(path, seconds), float(seconds[0])
 
@@ -165,7 +165,7 @@ def _number(value: Any) -> float:
         return math.nan
 
 
-def _text(data: h5py.Dataset, keys: Sequence[str]) -> str:
-    """First of some attributes as text; empty without any."""
-    value = next((data.attrs[key] for key in keys if key in data.attrs), "")
+def _unit(data: h5py.Dataset) -> str:
+    """Return the unit as written in the file; empty without any."""
+    value = next((data.attrs[key] for key in _UNITS if key in data.attrs), "")
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from exugear.exchange.channels import SHOWN_NAMES, channels_like
 from exugear.gearbox.units import Unit, unit_of
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin, TitledRows
@@ -19,8 +19,6 @@ FEWEST_SAMPLES = 16
 """Minimum number of samples of a recording."""
 MOST_SAMPLES = 200_000_000
 """Maximum number of samples of a channel: 1.6 GB in memory, 66 minutes at 50 kHz."""
-SHOWN_NAMES = 12
-"""Maximum number of channel names that a message lists."""
 SAME_RATE = 1e-5
 """Relative difference up to which sampling rates are equal: headers round the time step to six digits."""
 GAP = 1.5
@@ -154,10 +152,7 @@ def places_of(path: Path, available: Sequence[str], wanted: Iterable[str] | None
         elif name.lower() in lower:
             places.append(lower.index(name.lower()))
         else:
-            near = difflib.get_close_matches(name.lower(), lower, n=3, cutoff=0.5)
-            likely = [available[lower.index(own)] for own in near] or list(available[:SHOWN_NAMES])
-            told = "names like it are" if near else "its channels are"
-            raise RecordingError(f"{path}: no channel {name!r}; {told} {', '.join(likely)}")
+            raise RecordingError(f"{path}: no channel {name!r}; {channels_like(name, available)}")
     return tuple(places)
 
 

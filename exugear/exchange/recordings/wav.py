@@ -14,8 +14,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import IO
 
-import numpy as np
-
 from exugear.exchange.recordings.recording import (
     RecordedChannel,
     Recording,
@@ -60,17 +58,12 @@ def read_wav(path: Path, wanted: Sequence[str] | None = None) -> Recording:
         raise RecordingError(
             f"{path}: is a damaged WAV file: {columns.shape[1]} of {channels} channels; export it again"
         )
-    scale, offset = _full_scale(columns.dtype)
+    scale, offset = 1.0, 0.0
+    if columns.dtype.kind != "f":  # samples of eight bits are unsigned, those of 24 bits in the upper part of 32
+        scale = 2.0 ** (8 * columns.dtype.itemsize - 1)
+        offset = scale if columns.dtype.kind == "u" else 0.0
     found = [RecordedChannel(names[n], "", (floats(columns[:, n]) - offset) / scale) for n in chosen]
     return recording_of(path, rate, 0.0, found)
-
-
-def _full_scale(kind: np.dtype[np.generic]) -> tuple[float, float]:
-    """Full scale and zero of samples; those of eight bits are unsigned, of 24 bits in the upper part of 32."""
-    if kind.kind == "f":
-        return 1.0, 0.0
-    size = 2.0 ** (8 * kind.itemsize - 1)
-    return size, size if kind.kind == "u" else 0.0
 
 
 def _checked_header(path: Path, file: IO[bytes]) -> tuple[int, float]:

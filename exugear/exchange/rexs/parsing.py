@@ -406,7 +406,10 @@ def parse_model(content: bytes) -> Model:
     errors: list[str] = []
     components: dict[int, Component] = {}
     for node in document.children(document.model, "components"):
-        component = _component(document, node)
+        stated = document.head(node)
+        number, kind = _component_number(document, node), str(stated.get("type", ""))
+        name = str(stated.get("name") or "")
+        component = Component(number, TYPES.get(kind, kind), name, _attributes(document, node))
         if component.number in components:
             errors.append(f"two components have the id {component.number}")
         components[component.number] = component
@@ -438,13 +441,6 @@ def _check_version(version: str) -> None:
     if not LEAST_VERSION <= number <= LAST_VERSION:
         least, last = (".".join(map(str, pair)) for pair in (LEAST_VERSION, LAST_VERSION))
         raise RexsError(f"the file is of REXS version '{plain(version)}'; versions {least} to {last} can be read")
-
-
-def _component(document: Document, node: Any) -> Component:
-    head = document.head(node)
-    kind = str(head.get("type", ""))
-    number = _component_number(document, node)
-    return Component(number, TYPES.get(kind, kind), str(head.get("name") or ""), _attributes(document, node))
 
 
 def _component_number(document: Document, node: Any) -> int:

@@ -148,10 +148,10 @@ class Component:
             The value is not a whole number.
         """
         value = self.quantity(key)
-        if value is not None and value != round(value):
-            raise RexsError(f"{self}: {key} = {value:g} is not a whole number")
         if value is None:
             return None
+        if value != round(value):
+            raise RexsError(f"{self}: {key} = {value:g} is not a whole number")
         return round(value)
 
     def has_lost_vector(self, key: str) -> bool:

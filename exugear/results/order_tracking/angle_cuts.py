@@ -55,19 +55,6 @@ class AngleWindow:
             f"{step:g} revolution{'s' * (step != 1.0)} apart"
         )
 
-    def leakage(self, distance: Floats) -> Floats:
-        """Envelope of the response to an order of amplitude 1 that is some orders away.
-
-        It is one over pi d (d^2 - 1) with d in one over the revolutions, beyond the main lobe; 1 within it.
-
-        Examples
-        --------
-        >>> (20.0 * np.log10(AngleWindow(8.0).leakage(np.array([0.1, 0.5, 1.0, 2.0])))).round()
-        array([  0., -46., -64., -82.])
-        """
-        d = np.abs(distance) * self.revolutions
-        return np.where(d > 2.0, 1.0 / (np.pi * d * np.maximum(d * d - 1.0, 1.0)), 1.0)
-
 
 def angle_cuts(
     values: Floats, shaft: ShaftAngle, lines: Sequence[OrderLine], window: AngleWindow | None = None, per: float = 1.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -121,12 +121,13 @@ class SoundOverSpeed:
         point = int(np.argmax(np.nansum(weighted, axis=1)))
         powers = np.stack([self.power[point], weighted[point]])
         levels = power_level(np.nan_to_num(powers))
+        speed = float(self.speed[point])
         frequency = self.frequency[point]
         loudest = np.argsort(-levels[1], kind="stable")[:SHOWN_ORDERS]
         numbers, bands = third_octave_powers(powers, np.stack([frequency] * 2))
         return {
             **self.surface,
-            "speed_rpm": float(self.speed[point]) / RPM,
+            "speed_rpm": speed / RPM,
             **_levels(power_level(np.nansum(powers, axis=1))),
             "orders": [
                 {"line": self.names[line], "frequency_Hz": float(frequency[line]), **_levels(levels[:, line])}
@@ -138,21 +139,20 @@ class SoundOverSpeed:
                 for centre, own in zip(nominal_frequency(numbers), power_level(bands).T, strict=True)
                 if own[0] > power_level(np.zeros(1))[0]
             ],
-            "contributions": list(self._contributions(float(self.speed[point]))),
-            "left_out": [{"line": name, "frequency_Hz": frequency} for name, frequency in self.orders_left_out()],
-        }
-
-    def _contributions(self, speed: float) -> Iterator[dict[str, Any]]:
-        """Yield what makes the loudest orders, if they are explained at this speed."""
-        for own in self.contributions:
-            if math.isclose(abs(own["speed"]), speed, rel_tol=1e-9):
-                yield {
+            # What makes the loudest orders, if they are explained at this speed.
+            "contributions": [
+                {
                     "line": self.names[own["line"]],
                     "frequency_Hz": float(speed * self.orders[own["line"]] / (2.0 * np.pi)),
                     "meshes": own["meshes"],
                     "modes": own["modes"],
                     "supports": own["supports"],
                 }
+                for own in self.contributions
+                if math.isclose(abs(own["speed"]), speed, rel_tol=1e-9)
+            ],
+            "left_out": [{"line": name, "frequency_Hz": frequency} for name, frequency in self.orders_left_out()],
+        }
 
 
 def _levels(levels: Floats) -> dict[str, float]:

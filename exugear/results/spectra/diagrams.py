@@ -162,7 +162,7 @@ def _draw_waterfall(
     )
     panel.grid(False)
     panel.set(xlim=(0.0, fastest), ylim=(0.0, 1e-3 * top), xlabel="Input speed / rpm")
-    _draw_order_lines(panel, lines, fastest, top, "white")
+    _draw_order_lines(panel, lines, fastest, top)
     return image
 
 
@@ -197,8 +197,8 @@ def pooled_levels(
     return np.where(np.isneginf(cells), np.nan, cells).T
 
 
-def _draw_order_lines(panel: Axes, lines: Sequence[OrderLine], fastest: float, top: float, colour: str) -> None:
-    """Draw lines from the origin (rpm, kHz) and name each where it leaves the panel, above or to the right."""
+def _draw_order_lines(panel: Axes, lines: Sequence[OrderLine], fastest: float, top: float) -> None:
+    """Draw white lines from the origin (rpm, kHz) and name each where it leaves the panel, above or to the right."""
     taken_above: list[float] = []
     taken_right: list[float] = []
     for line in sorted(lines, key=lambda line: line.order):
@@ -206,7 +206,7 @@ def _draw_order_lines(panel: Axes, lines: Sequence[OrderLine], fastest: float, t
         above = end > top
         speed, frequency = (fastest * top / end, top) if above else (fastest, end)
         # Sparse dots, as a full line would hide the level along it.
-        panel.plot([0.0, speed], [0.0, 1e-3 * frequency], color=colour, linewidth=0.8, linestyle=(0, (1, 7)))
+        panel.plot([0.0, speed], [0.0, 1e-3 * frequency], color="white", linewidth=0.8, linestyle=(0, (1, 7)))
         taken, position = (taken_above, speed / fastest) if above else (taken_right, frequency / top)
         if all(abs(position - other) > 0.04 for other in taken):
             taken.append(position)

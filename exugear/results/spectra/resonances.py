@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from exugear.gearbox.units import RPM
-from exugear.results.spectra.waterfall import OrderLine, Waterfall, overlapping_frames
+from exugear.results.spectra.waterfall import OrderLine, Waterfall, overlapping_frames, sweep_matched_window
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 
@@ -154,8 +154,8 @@ def group_by_frequency(picks: Iterable[Pick]) -> tuple[WaterfallResonance, ...]:
     groups: list[WaterfallResonance] = []
     while waiting:
         highest = waiting[0]
-        members = [pick for pick in waiting if _are_indistinct(highest, pick)]
-        waiting = [pick for pick in waiting if not _are_indistinct(highest, pick)]
+        members = [pick for pick in waiting if are_indistinct(highest, pick)]
+        waiting = [pick for pick in waiting if not are_indistinct(highest, pick)]
         weights = np.array([pick.resolution**-2 for pick in members])
         frequencies = np.array([pick.frequency for pick in members])
         groups.append(
@@ -168,7 +168,8 @@ def group_by_frequency(picks: Iterable[Pick]) -> tuple[WaterfallResonance, ...]:
     return tuple(sorted(groups, key=lambda group: group.frequency))
 
 
-def _are_indistinct(first: Pick, second: Pick) -> bool:
+def are_indistinct(first: Pick, second: Pick) -> bool:
+    """Return whether the frequencies of two peaks differ by at most the larger of both resolutions."""
     return abs(first.frequency - second.frequency) <= max(first.resolution, second.resolution)
 
 
@@ -325,7 +326,7 @@ def run_up_cut(time: Floats, values: Floats, speed: Floats, line: OrderLine) -> 
     """
     rate = (len(time) - 1) / float(time[-1] - time[0])
     sweeps = sweep_rate(time, speed, line.order)
-    window = 1.0 / math.sqrt(sweeps) if sweeps > 0.0 else 0.1 * float(time[-1] - time[0])
+    window = sweep_matched_window(sweeps) if sweeps > 0.0 else 0.1 * float(time[-1] - time[0])
     window = max(FEWEST_SAMPLES / rate, min(window, 0.2 * float(time[-1] - time[0])))
     # At low speed the window is as long as a period of the order, so that the mean value would leak into it.
     return order_cut(values - values.mean(), speed, rate, line, window_length=window)

@@ -19,6 +19,7 @@ from exugear.results.spectra.diagrams import draw_highest_levels
 from exugear.results.spectra.resonances import (
     Pick,
     WaterfallResonance,
+    are_indistinct,
     group_by_frequency,
     match_eigenfrequencies,
     peaks_on_line,
@@ -251,7 +252,7 @@ class VariantRun(ReprMixin):
         """Resonances of all peaks, by frequency, each with its mode."""
         resonances = group_by_frequency(self.picks)
         if self.modes is None:
-            return tuple(Finding(resonance, None, math.nan, "") for resonance in resonances)
+            return tuple(self._finding(resonance, None) for resonance in resonances)
         visible = self._seen_modes(self.modes)
         matches = match_eigenfrequencies(resonances, self.modes["frequency"].to_numpy()[visible])
         return tuple(
@@ -330,7 +331,7 @@ def _is_absent(pick: Pick, other: Waterfall, peaks: Sequence[Pick], rule: Absenc
     near = np.isfinite(level) & (np.abs(frequency - pick.frequency) <= pick.resolution)
     if not np.any(near):
         return False
-    same_place = any(abs(peak.frequency - pick.frequency) <= max(pick.resolution, peak.resolution) for peak in peaks)
+    same_place = any(are_indistinct(peak, pick) for peak in peaks)
     return not same_place and float(level[near].max()) <= pick.level - rule.margin
 
 
@@ -459,11 +460,7 @@ def is_among(pick: Pick, picks: Iterable[Pick]) -> bool:
     >>> is_among(peak, [Pick(line, 1.1, 10.2, 610.0, 20.5, 7.0, 14.0)]), is_among(peak, [])
     (True, False)
     """
-    return any(
-        other.line.name == pick.line.name
-        and abs(other.frequency - pick.frequency) <= max(other.resolution, pick.resolution)
-        for other in picks
-    )
+    return any(other.line.name == pick.line.name and are_indistinct(other, pick) for other in picks)
 
 
 def survives(pick: Pick, variant: str, windows: Iterable[OtherWindow]) -> bool:

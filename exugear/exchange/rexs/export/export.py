@@ -543,10 +543,12 @@ def _static_load_case(gearbox: Gearbox, model: Model) -> int | None:
 
 def _replaced(results: Results) -> tuple[str, ...]:
     entries = []
+    cases = {case.number: case.changes for case in results.model.load_cases}
     for addition in results.additions:
         part = results.model.components[addition.component]
-        cases = {case.number: case.changes.get(addition.component, {}) for case in results.model.load_cases}
-        there = part.attributes if addition.load_case is None else cases[addition.load_case]
+        there = part.attributes
+        if addition.load_case is not None:
+            there = cases[addition.load_case].get(addition.component, {})
         if ATTRIBUTES.get(addition.name, addition.name) in there and not addition.name.startswith(OWN):
             entries.append(f"{part}: {addition.name}")
     return tuple(entries)

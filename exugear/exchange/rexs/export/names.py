@@ -10,9 +10,9 @@ from exugear.exchange.rexs.mapping import BEARINGS, GEARS, OWN, RESULTS, Version
 from exugear.exchange.rexs.to_case.bodies import ends
 from exugear.exchange.rexs.to_case.conversion import Found
 from exugear.exchange.rexs.to_case.gear_blocks import Teeth, first_of_planets
-from exugear.exchange.rexs.to_case.notes import Block, ComponentPositions
+from exugear.exchange.rexs.to_case.notes import Block
 from exugear.exchange.rexs.to_case.supports import PLACE_TOLERANCE
-from exugear.exchange.rexs.tree import Component, Model
+from exugear.exchange.rexs.tree import Model
 from exugear.gearbox.units import MM
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin
@@ -107,7 +107,7 @@ def origins_of(found: Found) -> Origins:
         held,
         bodies,
         {part.number: places.axes(part) for part in placed},
-        {part.number: MM * _z(places, part) for part in placed},
+        {part.number: MM * places.position(part)[2] for part in placed},
     )
 
 
@@ -136,14 +136,11 @@ def _bearings(found_in: Found, block: Block) -> tuple[int, ...]:
         return (component.number,)
     planets = [[part.number for part in parts] for parts in body.others]
     found: list[tuple[int, int]] = []
+    z = places.position(component)[2]
     for part in model.components_of_type(component.type):
         place = next(
             (n for n, parts in enumerate(planets) for end in ends(model, part) or () if end.number in parts), -1
         )
-        if place >= 0 and math.isclose(_z(places, part), _z(places, component), abs_tol=PLACE_TOLERANCE):
+        if place >= 0 and math.isclose(places.position(part)[2], z, abs_tol=PLACE_TOLERANCE):
             found.append((place, part.number))
     return (component.number, *(number for _, number in sorted(found)))
-
-
-def _z(places: ComponentPositions, part: Component) -> float:
-    return places.position(part)[2]

@@ -369,18 +369,15 @@ class _GearboxDraft:
             gearbox = Gearbox.from_dict(content, str(path))
             check_parts(gearbox)
         except GearboxFileError as error:
-            errors = [self._with_components(line.removeprefix(f"{path}: ")) for line in error.errors]
+            blocks = {name: block.comment for _, group in self.groups for name, block in group.items() if block.comment}
+            errors = []
+            for line in (line.removeprefix(f"{path}: ") for line in error.errors):
+                words = {*re.split(r"[^\w.]", line), *re.split(r"\W", line)}
+                named = [name for name in blocks if name in words or name.split(".")[1] in words]
+                components = "; ".join(f"{name} is {blocks[name]}" for name in named)
+                errors.append(f"{line} ({components})" if components else line)
             raise RexsError(*errors) from None
         return gearbox
-
-    def _with_components(self, error: str) -> str:
-        """Return an error of the gearbox file with the REXS components of the named parts."""
-        words = set(re.split(r"[^\w.]", error)) | set(re.split(r"\W", error))
-        blocks = {name: block.comment for _, group in self.groups for name, block in group.items() if block.comment}
-        entries = [
-            f"{name} is {comment}" for name, comment in blocks.items() if name in words or name.split(".")[1] in words
-        ]
-        return f"{error} ({'; '.join(entries)})" if entries else error
 
     def leave_stiff(self, source: str, path: str | Path) -> None:
         """Set bodies to rigid in all variants if their shape cannot contain the seats, and record the reason."""

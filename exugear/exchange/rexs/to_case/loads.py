@@ -271,25 +271,18 @@ def load_case_blocks(loads: Sequence[ImportedLoads], ends: Ends, static: float, 
         entries["duration_s"] = assumed(1.0, "")
         blocks[load.name] = Block("", entries)
     if fastest:
-        blocks["run_up"] = _run_up(ends, static, ratio, fastest)
-    return blocks
-
-
-def _run_up(ends: Ends, torque: float, ratio: float, speed: float) -> Block:
-    return Block(
-        "",
-        {
+        stiffness = tidy(max(100.0 * abs(static), 10.0))
+        entries = {
             "description": Entry("the input is driven up to its speed, the output loaded"),
-            "torques_N_m": derived({ends.output: _rounded(-torque / ratio)}, "as in the static state"),
+            "torques_N_m": derived({ends.output: _rounded(-static / ratio)}, "as in the static state"),
             "driven_body": Entry(ends.input),
-            "start_speed_rpm": assumed(tidy(LEAST_SHARE * speed), ""),
-            "end_speed_rpm": derived(tidy(speed), "the fastest of the file"),
-            "drive_stiffness_N_m_per_rad": assumed(
-                tidy(max(100.0 * abs(torque), 10.0)), "twist 0.01 rad under the torque of the static state"
-            ),
+            "start_speed_rpm": assumed(tidy(LEAST_SHARE * fastest), ""),
+            "end_speed_rpm": derived(tidy(fastest), "the fastest of the file"),
+            "drive_stiffness_N_m_per_rad": assumed(stiffness, "twist 0.01 rad under the torque of the static state"),
             "duration_s": assumed(5.0, ""),
-        },
-    )
+        }
+        blocks["run_up"] = Block("", entries)
+    return blocks
 
 
 def _input_speed(loads: ImportedLoads, ends: Ends, ratio: float) -> float:

@@ -50,9 +50,9 @@ class Stage:
     """First of the equal stages, one of which exists for each planet."""
     pinion: int
     gear: int
-    """Centre distance, mm: the specified one, or that of the positions, according to the rules of the import."""
+    """Numbers of the components of both gears."""
     distance: Entry
-    """Centre distance, mm; that of the positions, or the selected one if they differ."""
+    """Centre distance, mm: the specified one, or that of the positions, according to the rules of the import."""
     apart: float
     """Distance of the axes from their positions, mm."""
     common_face: Entry | None = None
@@ -271,26 +271,19 @@ def with_equal_racks(gears: Mapping[int, Toothing], stages: Sequence[Stage], not
         open_stages.remove(stage)
         keep, other = stage.both[::-1] if stage.gear in settled else stage.both
         settled |= {keep, other}
-        if _have_one_rack(same[keep], same[other]) or not _have_one_base_pitch(same[keep], same[other]):
+        mate, gear = same[keep], same[other]
+        of_mate, own = ((one.module.value, one.pressure_angle.value) for one in (mate, gear))
+        (wanted, wanted_sine), (pitch, sine) = _base_pitch(mate), _base_pitch(gear)
+        one_pitch = abs(wanted - pitch) <= PITCH_TOLERANCE * pitch and abs(wanted_sine - sine) <= PITCH_TOLERANCE
+        if np.allclose(of_mate, own, rtol=RACK_TOLERANCE, atol=0.0) or not one_pitch:
             continue
-        mate = same[keep]
         notes.changed.append(
-            f"{same[other].part}: m_n = {same[other].module.value:g} mm at {same[other].pressure_angle.value:g} deg "
+            f"{gear.part}: m_n = {gear.module.value:g} mm at {gear.pressure_angle.value:g} deg "
             f"has the base pitch of {mate.part}; described by its rack of {mate.module.value:g} mm at "
             f"{mate.pressure_angle.value:g} deg, base circle, tooth thickness and diameters kept"
         )
-        same[other] = _relative_to_mating_rack(mate, same[other])
+        same[other] = _relative_to_mating_rack(mate, gear)
     return same
-
-
-def _have_one_rack(toothing: Toothing, other: Toothing) -> bool:
-    pairs = ((toothing.module, other.module), (toothing.pressure_angle, other.pressure_angle))
-    return all(abs(a.value - b.value) <= RACK_TOLERANCE * abs(b.value) for a, b in pairs)
-
-
-def _have_one_base_pitch(toothing: Toothing, other: Toothing) -> bool:
-    (pitch, sine), (other_pitch, other_sine) = (_base_pitch(gear) for gear in (toothing, other))
-    return abs(pitch - other_pitch) <= PITCH_TOLERANCE * other_pitch and abs(sine - other_sine) <= PITCH_TOLERANCE
 
 
 def _base_pitch(gear: Toothing) -> tuple[float, float]:

@@ -222,11 +222,11 @@ class ComponentPositions(ReprMixin):
         directions: dict[Component, Floats] = {}
         for part in model.components_of_type(*TURNING):
             with errors.gathered():
-                directions[part] = self._frame(part, 0)[1][:, 0]
+                directions[part] = self._frame(part)[1][:, 0]
         errors.tell()
         # A file without a gear unit has the axes of its first part.
         first = [*self._model.components_of_type("gear_unit"), *list(directions)][:1]
-        self._axes = _axes(list(directions.values()), self._frame(first[0], 0)[1] if first else np.eye(3))
+        self._axes = _axes(list(directions.values()), self._frame(first[0])[1] if first else np.eye(3))
         skew = [part for part, direction in directions.items() if abs(direction @ self._axes[2]) < 1.0 - PARALLEL]
         if skew:
             names = ", ".join(str(part) for part in skew[:3])
@@ -245,11 +245,9 @@ class ComponentPositions(ReprMixin):
         """
         if not part.given("support_vector"):
             raise RexsError(f"{part}: support_vector is missing, so its position is unknown")
-        x, y, z = (self._axes @ self._frame(part, 0)[0]).tolist()
-        by = self._moved.get(part.number, (0.0, 0.0))
-        x = x + by[0]
-        y = y + by[1]
-        return tidy(round(x, 9)), tidy(round(y, 9)), tidy(round(z, 9))
+        x, y, z = (self._axes @ self._frame(part)[0]).tolist()
+        aside, up = self._moved.get(part.number, (0.0, 0.0))
+        return tidy(round(x + aside, 9)), tidy(round(y + up, 9)), tidy(round(z, 9))
 
     def move(self, parts: Iterable[Component], by: tuple[float, float]) -> None:
         """Move components by x and y, mm, if other values of the file have priority."""
@@ -258,17 +256,17 @@ class ComponentPositions(ReprMixin):
 
     def sense(self, part: Component) -> int:
         """Sense of a component's u axis: 1 along +z, -1 against it."""
-        return 1 if self._frame(part, 0)[1][:, 0] @ self._axes[2] > 0.0 else -1
+        return 1 if self._frame(part)[1][:, 0] @ self._axes[2] > 0.0 else -1
 
     def axes(self, part: Component) -> Floats:
         """Axes u, v, w of a component as the rows of a (3, 3) array, in the axes of the gearbox file."""
-        return np.asarray((self._axes @ self._frame(part, 0)[1]).T)
+        return np.asarray((self._axes @ self._frame(part)[1]).T)
 
     def turned(self, vector: Floats) -> Floats:
         """Transform a vector from the axes of the gear unit to those of the gearbox file."""
         return np.asarray(self._axes @ vector)
 
-    def _frame(self, part: Component, depth: int) -> tuple[Floats, Floats]:
+    def _frame(self, part: Component, depth: int = 0) -> tuple[Floats, Floats]:
         """Origin (3) and axes u, v, w as columns (3, 3), in the outermost frame."""
         if part.number in self._frames:
             return self._frames[part.number]
