@@ -230,10 +230,11 @@ class _Evaluated:
 
     def _report_record(self, record: Record) -> None:
         """Report the numbers of finished and failed points, and the maximum number of points of all searches."""
+        self.records[record.point] = record
         wanted = self.study.file.optimise
         if self.tell is None or wanted is None:
             return
-        failed = sum(bool(record.error) for record in self.records.values()) + bool(record.error)
+        failed = sum(bool(known.error) for known in self.records.values())
         searches = wanted.weightings if len(wanted.minimise) == 2 else 1
         points = 1 + searches * wanted.population * (wanted.generations + 1)
         draws = 1 if self.study.tolerances is None else len(self.study.tolerances.draws)

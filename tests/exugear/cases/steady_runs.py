@@ -158,10 +158,10 @@ def run_from(model, response, duration, step, torque, assembly=None, name="overa
 
     The overall transmission error is a length here.
     """
-    time, signals_over_time, angle, observer = whole_run(model, response, duration, step, torque, assembly)
+    time, signals_over_time, states, observer = whole_run(model, response, duration, step, torque, assembly)
     column = column_of(observer, name)
     factor = 1.0 if " " in name else observer.layout.radius
-    return time, factor * signals_over_time[:, column], angle
+    return time, factor * signals_over_time[:, column], states[:, model.system.pinned]
 
 
 def column_of(observer, name):
@@ -183,17 +183,16 @@ def start_of(model, response):
     return system.frame.state(0.0, interface.speed, u, 2.0 * (1j * w * motion[1:]).sum(axis=0).real)[:2]
 
 
-def whole_run(model, response, duration, step, torque, assembly=None):
-    """Instants, all signals, and angle of the input of a run in time that starts on a response; its observer."""
-    system = model.system
+def whole_run(model, response, duration, step, torque, assembly=None, every=8):
+    """Instants, all signals, and coordinates of a run in time that starts on a response, every few steps; its observer."""
     assembly = assembly or model.waves.assembly
     q, v = start_of(model, response)
     load = assembly.gearbox.case.static_load
     loads = LoadTable({**load.torques_N_m, load.locked[0]: torque}, varying=assembly.varying_loads)
     run = CompiledSystem(assembly, q, v, loads, step)
     observer = Observer(assembly, loads)
-    steps, every = round(duration / step), 8
-    time, signal, angle = [], [], []
+    steps = round(duration / step)
+    time, signal, coordinates = [], [], []
     for first in range(0, steps, 8000):
         states = np.empty((8000, assembly.size))
         rates = np.empty_like(states)
@@ -201,8 +200,8 @@ def whole_run(model, response, duration, step, torque, assembly=None):
         time.append(step * (first + np.arange(every, 8001, every)))
         states, rates = (np.ascontiguousarray(values[every - 1 :: every]) for values in (states, rates))
         signal.append(observer.observe(time[-1], states, rates)[0])
-        angle.append(states[:, system.pinned])
-    return (*(np.concatenate(values) for values in (time, signal, angle)), observer)
+        coordinates.append(states)
+    return (*(np.concatenate(values) for values in (time, signal, coordinates)), observer)
 
 
 def fitted(solver, response, duration, step, last, assembly=None, name="overall_dte_angle"):
@@ -277,9 +276,9 @@ def planets_apart_over_time(solver, speed, duration, step, last):
     """
     model = solver.model
     response = solver.response(speed)
-    time, found, angle, observer = whole_run(model, response, duration, step, drive_of(model, response))
+    time, found, states, observer = whole_run(model, response, duration, step, drive_of(model, response))
     late = time > duration - last
-    mean, rolled = rolling(model, response, time[late], angle[late])
+    mean, rolled = rolling(model, response, time[late], states[late, model.system.pinned])
     lines = signals(model, solver.response(mean))
     names = [own.name for own in model.signal_names]
     angles = np.outer(np.copysign(1.0, speed) * rolled, model.lines.bases)
@@ -295,3 +294,48 @@ def planets_apart_over_time(solver, speed, duration, step, last):
             forces.append(float(np.std(own - known[:, place]) / np.std(own)))
     error = float(np.std(overall - model.lines.values(lines[:, [0]], angles)[:, 0]))
     return error, float(np.std(overall)), max(forces)
+
+
+def amplitudes_apart(solver, speed, duration, step, last):
+    """Differences of the amplitudes of all orders together between response and run, over their size, by quantity.
+
+    Forces of meshes are those of the run, as waves of planets. Forces of bearings and accelerations of their seats
+    follow from the lines of its motion; what is less than a hundredth of the largest of a quantity is left out.
+
+    Returns
+    -------
+    mapping of quantity to (k, 2) differences and sizes of its signals, in the quantities' units
+    """
+    model = solver.model
+    response = solver.response(speed)
+    drive = drive_of(model, response)
+    time, found, states, observer = whole_run(model, response, duration, step, drive, every=4)
+    late = time > duration - last
+    mean, rolled = rolling(model, response, time[late], states[late, model.system.pinned])
+    response = solver.response(mean)
+    known = signals(model, response)
+    names = [own.name for own in model.signal_names]
+    of_run = [frame_coordinates(model.system.frame, states[late], rolled) - model.system.static_at(mean)]
+    columns = [slice(0, model.system.size)]
+    places = []
+    for meshes, planets in model.waves.groups:
+        waves = [wave for wave in (model.waves.waves[n] for n in model.waves.force_waves) if wave.first == meshes[0]]
+        places += [names.index(f"mesh_force {wave.name}") for wave in waves]
+        elements = [model.waves.assembly.elements[mesh].mesh.name for mesh in meshes]
+        forces = found[late][:, [column_of(observer, f"mesh_force {name}") for name in elements]]
+        of_run.append(forces if planets is None else _back(planets.values(planets.ratio * rolled), forces))
+    lines = lines_through(model, rolled, np.hstack(of_run), np.linalg.norm(response.motion, axis=1) > 0.0)
+    motion, of_meshes = lines[:, : model.system.size], lines[:, model.system.size :]
+    interface = response.interface
+    made = np.zeros_like(known)
+    of_motion = interface.rows.of(motion, interface.frequencies)
+    made[:, : of_motion.shape[1]] = of_motion
+    made[:, places] = of_meshes
+    apart_by = {}
+    for quantity in ("overall_dte", "mesh_force", "support_force", "seat_acceleration"):
+        own = [n for n, signal in enumerate(model.signal_names) if signal.quantity == quantity]
+        size = np.linalg.norm(known[1:, own], axis=0)
+        change = np.linalg.norm(np.abs(made[1:, own]) - np.abs(known[1:, own]), axis=0)
+        large = size > 0.01 * size.max()
+        apart_by[quantity] = np.column_stack([change, size])[large]
+    return apart_by

@@ -95,9 +95,9 @@ def largest_difference(solver, speed, duration, step, last, assembly):
     model = solver.model
     response = solver.response(speed)
     torque = drive_of(model, response)
-    time, found, angle, observer = whole_run(model, response, duration, step, torque, assembly)
+    time, found, states, observer = whole_run(model, response, duration, step, torque, assembly)
     late = time > duration - last
-    mean, rolled = rolling(model, response, time[late], angle[late])
+    mean, rolled = rolling(model, response, time[late], states[late, model.system.pinned])
     response = solver.response(mean)
     apart_by = []
     for meshes, known in forces_of_planets(model, response, rolled).items():
@@ -253,9 +253,9 @@ def lines_of_run(solver, speed, assembly, names):
     model = solver.model
     response = solver.response(speed)
     torque = drive_of(model, response)
-    time, found, angle, observer = whole_run(model, response, 3.0, 1.0 / 120e3, torque, assembly)
+    time, found, states, observer = whole_run(model, response, 3.0, 1.0 / 120e3, torque, assembly)
     late = time > 1.0
-    mean, rolled = rolling(model, response, time[late], angle[late])
+    mean, rolled = rolling(model, response, time[late], states[late, model.system.pinned])
     phases = np.outer(rolled, model.lines.orders)
     columns = np.hstack([np.cos(phases), -np.sin(phases[:, 1:])])
     layout = observer.layout

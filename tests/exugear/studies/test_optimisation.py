@@ -70,6 +70,14 @@ def test_a_search_that_is_begun_again_computes_nothing_twice(tmp_path):
     assert 0 < longer.computed <= 24
 
 
+def test_progress_counts_each_point_of_a_generation(tmp_path):
+    told = []
+    study = searched(tmp_path, "low", population=8, generations=1)
+    found = optimise(study, tmp_path / "out", HERE, progress=lambda *counts: told.append(counts))
+    assert [done for done, _, _ in told] == list(range(1, found.computed + 1))
+    assert {failed for _, failed, _ in told} == {0} and {most for _, _, most in told} == {17}
+
+
 def test_points_on_a_front_are_beaten_by_none():
     outputs = np.random.default_rng(1).random((60, 2))
     front = is_pareto_optimal(outputs)
