@@ -109,8 +109,6 @@ def solve_lines(
     )
 
 
-ROWS_TOGETHER = 8
-"""Rows that stay in fast memory while earlier ones pass, which are read from slow memory once for all of them."""
 LEFT_OVER = 1e-10
 """Residual over the load up to which a solution counts as such, both by the sum of all loads."""
 
@@ -127,6 +125,8 @@ class Elimination(NamedTuple):
     """(n + 1,) first entry of each row."""
     diagonal: Integers
     """(n,) entry on the diagonal."""
+    alike: Booleans
+    """(n,) whether the next step touches the same later rows: both are taken out of these at once."""
 
 
 def elimination(pattern: Booleans) -> Elimination:
@@ -151,13 +151,17 @@ def elimination(pattern: Booleans) -> Elimination:
         left[k] = False
         others = np.flatnonzero(filled[k] & left)
         filled[np.ix_(others, others)] = True
-    row, column = np.nonzero(filled[np.ix_(order, order)])
+    filled = np.triu(filled[np.ix_(order, order)])
+    row, column = np.nonzero(filled | filled.T)
+    own, following = (filled[:-1], filled[1:])
+    alike = (own == following).sum(axis=1) == n - 1  # but for the diagonal of the first
     return Elimination(
         order=order,
         row=row.astype(np.int64),
         column=column.astype(np.int64),
         first=np.searchsorted(row, np.arange(n + 1)).astype(np.int64),
         diagonal=np.flatnonzero(row == column).astype(np.int64),
+        alike=np.append(alike, False),
     )
 
 
@@ -237,7 +241,7 @@ def solve_side_by_side(
         *of_loads,
         place,
         matrix,
-        np.empty((ROWS_TOGETHER, len(order)), dtype=np.int64),
+        np.zeros(len(order), dtype=np.int64),
         x,
         amplitudes.view(np.float64),
         found.view(np.float64),
@@ -274,7 +278,7 @@ def solve_octets(
 
     Real and imaginary parts are in turns. Matrices are given by their entries (e,), loads (n, cases) and own loads
     (rows, 2 n) in the order of the elimination; `place` (lines,) is the row of each line. `matrix` (16 e, or 32 n if
-    that is more), `entries` (`ROWS_TOGETHER`, n) and `x` (16 n (cases + 2),) are memory.
+    that is more), `entries` (n,) and `x` (16 n (cases + 2),) are memory.
     """
     size = plan.order.size
     lines = batches.lines.size
@@ -401,22 +405,22 @@ def leave_over(plan: Elimination, stiffness: Floats, damping: Floats, mass: Floa
 def eliminate(plan: Elimination, cases: int, matrix: Floats, entries: Integers, x: Floats) -> None:
     """Solve eight systems, whose entries (16 e,) are overwritten, for a number of loads, which become the solutions.
 
-    Rows pass through in blocks: `entries` has those of each row of a block by their columns, -1 where there is none.
+    All earlier steps are taken out of one row after the other, whose `entries` (n,) are found by their columns.
     """
     size = plan.order.size
-    for begin in range(0, size, entries.shape[0]):
-        end = min(begin + entries.shape[0], size)
-        for i in range(begin, end):
-            for k in range(size):
-                entries[i - begin, k] = -1
-            for entry in range(plan.first[i], plan.first[i + 1]):
-                entries[i - begin, plan.column[entry]] = entry
-        for k in range(end):
-            if k >= begin:  # all steps before have been taken out of it
-                invert(2 * SIZE * plan.diagonal[k], matrix)
-            for i in range(max(begin, k + 1), end):
-                if entries[i - begin, k] >= 0:
-                    take_out(k, i, entries[i - begin], cases, plan, matrix, x)
+    for i in range(size):
+        for entry in range(plan.first[i], plan.first[i + 1]):
+            entries[plan.column[entry]] = entry
+        entry = plan.first[i]
+        while entry < plan.diagonal[i]:
+            k = plan.column[entry]
+            if plan.alike[k] and k + 1 < i:
+                take_out_two(k, i, entries, cases, plan, matrix, x)
+                entry += 2
+            else:
+                take_out(k, i, entries, cases, plan, matrix, x)
+                entry += 1
+        invert(2 * SIZE * plan.diagonal[i], matrix)
     for k in range(size - 1, -1, -1):
         substitute_back(k, cases, plan, matrix, x)
 
@@ -452,6 +456,48 @@ def take_out(k: int, i: int, entries: Integers, cases: int, plan: Elimination, m
         b = eight(out, at + SIZE)
         put(out, to, eight(out, to) - factor * a + turned * b)
         put(out, to + SIZE, eight(out, to + SIZE) - factor * b - turned * a)
+
+
+@kernel
+def take_out_two(k: int, i: int, entries: Integers, cases: int, plan: Elimination, matrix: Floats, out: Floats) -> None:
+    """Take steps k and k + 1, which touch the same later rows, out of the row of step i: it is passed once."""
+    x = eight(matrix, 2 * SIZE * plan.diagonal[k])
+    y = eight(matrix, 2 * SIZE * plan.diagonal[k] + SIZE)
+    a = eight(matrix, 2 * SIZE * entries[k])
+    b = eight(matrix, 2 * SIZE * entries[k] + SIZE)
+    factor = a * x - b * y
+    turned = a * y + b * x
+    # The entry below the second diagonal without the first step, over that diagonal.
+    at = 2 * SIZE * (plan.diagonal[k] + 1)
+    to = 2 * SIZE * entries[k + 1]
+    a = eight(matrix, at)
+    b = eight(matrix, at + SIZE)
+    c = eight(matrix, to) - factor * a + turned * b
+    d = eight(matrix, to + SIZE) - factor * b - turned * a
+    x = eight(matrix, 2 * SIZE * plan.diagonal[k + 1])
+    y = eight(matrix, 2 * SIZE * plan.diagonal[k + 1] + SIZE)
+    second = c * x - d * y
+    second_turned = c * y + d * x
+    begin = plan.diagonal[k] + 2
+    ahead = plan.diagonal[k + 1] + 1 - begin
+    for entry in range(begin, plan.first[k + 1]):
+        at = 2 * SIZE * entry
+        to = 2 * SIZE * entries[plan.column[entry]]
+        a = eight(matrix, at)
+        b = eight(matrix, at + SIZE)
+        c = eight(matrix, at + 2 * SIZE * ahead)
+        d = eight(matrix, at + 2 * SIZE * ahead + SIZE)
+        put(matrix, to, eight(matrix, to) - factor * a + turned * b - second * c + second_turned * d)
+        put(matrix, to + SIZE, eight(matrix, to + SIZE) - factor * b - turned * a - second * d - second_turned * c)
+    for case in range(cases):
+        at = 2 * SIZE * (k * cases + case)
+        to = 2 * SIZE * (i * cases + case)
+        a = eight(out, at)
+        b = eight(out, at + SIZE)
+        c = eight(out, at + 2 * SIZE * cases)
+        d = eight(out, at + 2 * SIZE * cases + SIZE)
+        put(out, to, eight(out, to) - factor * a + turned * b - second * c + second_turned * d)
+        put(out, to + SIZE, eight(out, to + SIZE) - factor * b - turned * a - second * d - second_turned * c)
 
 
 @kernel
