@@ -30,12 +30,12 @@ from exugear.report.findings.other_design import read_other_design
 from exugear.report.findings.parameter_variations import begin_variations, model_variations
 from exugear.report.findings.ratings import ratings_of
 from exugear.report.findings.resonance_list import resonance_list
-from exugear.report.findings.words import Labels
+from exugear.report.findings.words import Labels, capitalised
 from exugear.report.sections.answer import answer_section
 from exugear.report.sections.bearings import bearings_section
 from exugear.report.sections.changes import changes_section, stored_study
 from exugear.report.sections.gears import gears_section
-from exugear.report.sections.material import Part, ReportData, lines_of
+from exugear.report.sections.material import Part, ReportData
 from exugear.report.sections.model import model_section
 from exugear.report.sections.resonances import resonances_section
 from exugear.report.sections.run_data import run_data
@@ -43,6 +43,7 @@ from exugear.report.web.document import ArrayStore, whole_page
 from exugear.report.web.html import render
 from exugear.results.findings import Finding
 from exugear.results.folder import REPORT_FILE, read_stored_gearbox
+from exugear.results.spectra.waterfall import order_lines
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.files import write_file
 
@@ -88,8 +89,7 @@ def _scope(material: ReportData) -> str:
     parts += [material.words.labelled(static_load_in_words(gearbox)), gearbox.train.ratio_text]
     if material.headline is not None:
         parts += [Variant.of(material.headline.choice.variant).label, material.headline.source]
-    text = ", ".join(parts)
-    return f"{text[0].upper()}{text[1:]}."
+    return f"{capitalised(', '.join(parts))}."
 
 
 # The report of a results folder as a self-contained web page
@@ -216,9 +216,10 @@ def _material(context: Context, executor: Executor | None) -> ReportData:
         raise ReportError("\n".join([f"{context.folder}: no results of this gearbox file", *reasons]))
     groups = groups_of(context, results)
     words = Labels(context.gearbox)
+    lines = order_lines(context.gearbox)
     headline = headline_of(context, results, groups)
     lists = {(group.name, variant): resonance_list(group, variant) for group in groups for variant in group.runs}
-    material = ReportData(context, results, words, groups, (), lines_of(context), headline, ArrayStore(), lists)
+    material = ReportData(context, results, words, groups, (), lines, headline, ArrayStore(), lists)
     # Variations come last; another process may compute them in the meantime.
     drawn = run_data(material)
     return replace(

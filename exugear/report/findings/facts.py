@@ -14,7 +14,7 @@ from exugear.report.findings.context import REFERENCE_VARIANT, Context
 from exugear.report.findings.groups import RankedResonance, RunGroup
 from exugear.report.findings.headline import headline_of_group
 from exugear.report.findings.parameter_variations import BestChange, ModelVariations, best_change
-from exugear.report.findings.words import Labels, figure_text
+from exugear.report.findings.words import Labels, capitalised, figure_text
 from exugear.results.spectra.waterfall import order_lines
 from exugear.steady.peaks import peaks
 
@@ -301,7 +301,7 @@ def _amplitude_reductions(
     best = (best_words(words, max(others, key=lambda change: change.gain)),) if others else ()
     damping = [change for change in changes if change.label.startswith(DAMPING) and change.gain > 0.0]
     changed = ((words.change(change.label, change.value, change.default), change.gain) for change in damping)
-    return best + tuple(f"{text[:1].upper()}{text[1:]}: −{figure_text(gain, 2)} dB." for text, gain in changed)
+    return best + tuple(f"{capitalised(text)}: −{figure_text(gain, 2)} dB." for text, gain in changed)
 
 
 def best_words(words: Labels, best: BestChange) -> str:

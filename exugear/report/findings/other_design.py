@@ -125,24 +125,24 @@ def check_ranges(own: Gearbox, other: Gearbox) -> None:
 
 def differing_keys(own: Gearbox, other: Gearbox) -> Iterator[Difference]:
     """Yield the keys of two gearbox files that differ and may change results."""
-    first, second = (_flat(gearbox.case.model_dump(mode="json", exclude_defaults=True)) for gearbox in (own, other))
+    first, second = (flattened(gearbox.case.model_dump(mode="json", exclude_defaults=True)) for gearbox in (own, other))
     for key in sorted(first.keys() | second.keys()):
         if first.get(key) != second.get(key) and key.split(".")[0] not in DETAILS:
             yield Difference(key, first.get(key), second.get(key))
 
 
-def _flat(content: Mapping[str, Any], place: str = "") -> dict[str, Any]:
+def flattened(content: Mapping[str, Any], place: str = "") -> dict[str, Any]:
     """Return all values by dotted key.
 
     Examples
     --------
-    >>> _flat({"gears": {"sun": {"teeth": 21}}, "name": "GRC"})
+    >>> flattened({"gears": {"sun": {"teeth": 21}}, "name": "GRC"})
     {'gears.sun.teeth': 21, 'name': 'GRC'}
     """
     found: dict[str, Any] = {}
     for key, value in content.items():
         if isinstance(value, Mapping):
-            found |= _flat(value, f"{place}{key}.")
+            found |= flattened(value, f"{place}{key}.")
         else:
             found[f"{place}{key}"] = value
     return found

@@ -13,16 +13,11 @@ from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import excitations
 from exugear.report.findings.facts import MOST_WORDS, facts_of_response, short
-from exugear.report.findings.headline import (
-    Headline,
-    MatchedMode,
-    causes_of,
-    contributions_of,
-)
+from exugear.report.findings.headline import Headline, MatchedMode, causes_of, contributions_of
 from exugear.report.findings.margins import shortfalls_of
 from exugear.report.findings.parameter_variations import default_place, track_mode
 from exugear.report.findings.ranking import Envelope, Resonance, envelopes
-from exugear.report.findings.words import QUANTITIES, percentages, rounded_text
+from exugear.report.findings.words import QUANTITIES, capitalised, percentages, rounded_text
 from exugear.report.pictures.png import png_address
 from exugear.report.pictures.speed_diagrams import Strips, strips_of
 from exugear.report.pictures.still import mode_picture
@@ -83,7 +78,8 @@ def answer_section(material: ReportData) -> Part:
         lines = [fact.line for data in material.results.steady for fact in facts_of_response(material.words, data)]
         notes.extend(lines)
         return Part(render("answer", answer=None, lines=lines), title="Answer", name="answer")
-    notes.append(f"Results: {_scope(material, headline)}")
+    scope = _scope(material, headline)
+    notes.append(f"Results: {scope}")
     top = headline.top
     assert top is not None
     mode = headline.mode_of(top)
@@ -99,7 +95,7 @@ def answer_section(material: ReportData) -> Part:
     group = headline.group
     listed = () if group is None else material.lists[group.name, headline.choice.variant]
     answer: dict[str, Any] = {
-        "scope": _scope(material, headline),
+        "scope": scope,
         "kicker": _kicker(headline),
         "frequency": f"{rounded_text(top.frequency)} Hz",
         "speed": speed_text(top),
@@ -178,8 +174,7 @@ def _off_rated(material: ReportData, resonance: Resonance) -> str:
 
 
 def _sentence(material: ReportData, headline: Headline, top: Resonance, mode: MatchedMode | None) -> str:
-    line = material.words.line_sentence(material.words.order(top.line, top.order))
-    line = f"{line[0].upper()}{line[1:]}"
+    line = capitalised(material.words.line_sentence(material.words.order(top.line, top.order)))
     if mode is None or headline.modes is None:
         name = material.words.labelled(headline.mode_name(top))
         sentences = [f"{line} excites the mode {name}."] if name else []
@@ -261,9 +256,8 @@ def _cause_box(material: ReportData, headline: Headline, top: Resonance, known: 
         f"Its part of the static transmission error ({rounded_text(1e6 * first.swing)} µm peak-to-peak): "
         f"±{rounded_text(1e6 * first.amplitude)} µm.",
     )
-    facts = []
     of_pairs = [(cause.pair, cause.share) for cause in causes if cause.share is not None]
-    facts += _share_facts(material, [*of_pairs, *shares])
+    facts = _share_facts(material, [*of_pairs, *shares])
     if LAWS[headline.choice.mesh_model].moves_load and not headline.choice.variant.spins_only:
         context = material.context
         moved = {own.pair: own for own in shuttling_pairs(context.gearbox, context.folder, first.harmonic)}
@@ -277,7 +271,7 @@ def _cause_box(material: ReportData, headline: Headline, top: Resonance, known: 
             if parts:
                 moving += f"; its part of the amplitude: {100.0 * sum(parts):.0f} %".replace("-", "−")
             facts.append(("Shuttling", moving))
-    overlap = f"{rounded_text(first.overlap)}"
+    overlap = rounded_text(first.overlap)
     if first.overlap == 0.0:
         overlap += " (spur gears)"
     elif abs(first.overlap - round(first.overlap)) > 0.1:
@@ -392,7 +386,7 @@ def _rated_lines(headline: Headline, curves: Mapping[str, Envelope], rated: floa
     ]
     text = ", ".join(amplitude_text(name, value) for name, value in values.items())
     at = f" Resonance {near[0]} of the ranking." if near else ""
-    lines = [f"{text[0].upper()}{text[1:]}.{at}"]
+    lines = [f"{capitalised(text)}.{at}"]
     for name, value in values.items():
         leader = headline.ranking.leader(name)
         if leader is not None and value > leader.amplitudes[name].amplitude:
@@ -425,7 +419,7 @@ def _doubts(material: ReportData, headline: Headline, top: Resonance) -> Iterato
         place = default_place(variation)
         ends = [rounded_text(float(seen[n])) for n in (0, -1)]
         yield (
-            f"{label[0].upper()}{label[1:]} {values[0]:g} to {values[-1]:g} instead of {values[place]:g}: "
+            f"{capitalised(label)} {values[0]:g} to {values[-1]:g} instead of {values[place]:g}: "
             f"{ends[0]} to {ends[1]} Hz."
         )
     places = top.amplitudes[headline.ranking.quantity].places

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,7 @@ from exugear.report.findings.words import QUANTITIES, figure_text, percentages, 
 from exugear.report.sections.material import ReportData, model_name, source_words
 from exugear.report.web.document import rounded
 from exugear.report.web.stage import stage_data
-from exugear.results.spectra.run_spectra import VariantRun, report_mode
+from exugear.results.spectra.run_spectra import ModeReport, VariantRun, report_mode
 from exugear.results.spectra.waterfall import OrderLine, Waterfall
 from fe_ste.tools.arrays import Floats
 
@@ -378,7 +379,7 @@ def _model(material: ReportData, model: Choice, data: xr.Dataset) -> dict[str, A
         "words": model_label(model),
         "variant": model.variant,
         "stage": stage_data(
-            assembly, data["shape"].to_numpy(), labels, material.arrays, _deformed(material, model, data)
+            assembly, data["shape"].to_numpy(), labels, material.arrays, _deformed(material, model, reports)
         ),
         "modes": [
             {
@@ -391,7 +392,8 @@ def _model(material: ReportData, model: Choice, data: xr.Dataset) -> dict[str, A
     }
 
 
-def _deformed(material: ReportData, model: Choice, data: xr.Dataset) -> set[int]:
+def _deformed(material: ReportData, model: Choice, reports: Sequence[ModeReport]) -> set[int]:
+    """Return the modes in which flexible bodies deform."""
     if not model.variant.is_elastic:
         return set()
     matched = {
@@ -401,7 +403,6 @@ def _deformed(material: ReportData, model: Choice, data: xr.Dataset) -> set[int]
         for own in material.lists[group.name, model.variant]
         if own.mode is not None
     }
-    reports = [report_mode(data, index) for index in range(data.sizes["mode"])]
     seen = sorted((report for report in reports if report.share >= VISIBLE_SHARE), key=lambda one: -one.amplification)
     most = [*sorted(matched), *(one.index for one in seen if one.index not in matched)]
     return set(most[: max(DEFORMED, len(matched))])
