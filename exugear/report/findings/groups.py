@@ -32,6 +32,7 @@ from exugear.report.findings.ranking import (
     ConstantSpeed,
     OrderPeak,
     Ranking,
+    Resonance,
     highest_drawn,
     is_over_speed,
     most_complete_levels,
@@ -158,20 +159,12 @@ class RunGroup:
         inside, it is the highest of all.
         """
         picks = own.finding.resonance.picks
-        if leading := next(filter(self.is_leading, picks), None):
+        top = next(iter(self.in_operation.resonances), None)
+        if leading := next((pick for pick in picks if top is not None and is_peak_of(pick, top)), None):
             return leading
         low, high = self.in_operation.speeds
         inside = [pick for pick in picks if low <= abs(pick.speed) <= high]
         return max(inside, key=lambda pick: pick.level, default=own.peak)
-
-    def is_leading(self, peak: Pick) -> bool:
-        """Return whether a peak is that of the first resonance of the ranking."""
-        top = next(iter(self.in_operation.resonances), None)
-        return (
-            top is not None
-            and math.isclose(peak.line.order, top.order, rel_tol=1e-6)
-            and math.isclose(peak.frequency, top.frequency, rel_tol=SAME_FREQUENCY)
-        )
 
     def choice(self, variant: str) -> Choice:
         """Return the model settings of a run."""
@@ -185,6 +178,13 @@ class RunGroup:
             f"{self.source}, {MESH_MODEL_LABELS[self.mesh_model]}, inertia set {self.inertias}, housing stiffness "
             f"factor {', '.join(factors)}"
         )
+
+
+def is_peak_of(peak: Pick, resonance: Resonance) -> bool:
+    """Return whether a peak of the transmission error is that of a ranked resonance: same order, same frequency."""
+    return math.isclose(peak.line.order, resonance.order, rel_tol=1e-6) and math.isclose(
+        peak.frequency, resonance.frequency, rel_tol=SAME_FREQUENCY
+    )
 
 
 def groups_of(context: Context, results: StoredResults) -> tuple[RunGroup, ...]:

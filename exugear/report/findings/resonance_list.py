@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from exugear.report.findings.groups import SAME_FREQUENCY, RankedResonance, RunGroup
+from exugear.report.findings.groups import RankedResonance, RunGroup, is_peak_of
 from exugear.report.findings.headline import Headline, headline_of_response
 from exugear.report.findings.ranking import MIN_AMPLITUDE, Resonance, ranking_of
-from exugear.results.spectra.resonances import Pick
 from exugear.results.spectra.waterfall import OrderLine
 from exugear.steady.findings import speed_caveats
 
@@ -89,19 +88,9 @@ def _of_response(group: RunGroup, variant: str) -> Iterator[ListedResonance]:
             if not low <= abs(own.speed) <= high
         ][:MOST_OUTSIDE]
     for own in (*inside, *outside):
-        peak = _peak_of(group.ranked[variant], own)
+        picked = (one for one in group.ranked[variant] if any(is_peak_of(p, own) for p in one.finding.resonance.picks))
+        peak = next(picked, None)
         yield listed_resonance(headline, own, own in inside, peak, caveats.at(own.speed))
-
-
-def _peak_of(ranked: Sequence[RankedResonance], own: Resonance) -> RankedResonance | None:
-    """Return the resonance of the transmission error with a peak of the same order at the same frequency."""
-
-    def is_same(pick: Pick) -> bool:
-        return math.isclose(pick.line.order, own.order, rel_tol=1e-6) and math.isclose(
-            pick.frequency, own.frequency, rel_tol=SAME_FREQUENCY
-        )
-
-    return next((one for one in ranked if any(map(is_same, one.finding.resonance.picks))), None)
 
 
 def _of_run(group: RunGroup, variant: str) -> Iterator[ListedResonance]:

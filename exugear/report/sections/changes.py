@@ -96,10 +96,10 @@ def stored_study(context: Context) -> DesignStudy | None:
         context.notes.left_out.append(str(error))
         return None
     except (ValueError, KeyError, SteadyError) as error:
-        context.notes.left_out.append(f"{context.name_of(path)}: {error}")
+        context.leave_out(path, error)
         return None
     if not fits:
-        context.notes.left_out.append(f"{context.name_of(path)}: {OTHER_INPUT}")
+        context.leave_out(path, OTHER_INPUT)
         return None
     return study
 

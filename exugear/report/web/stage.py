@@ -16,11 +16,10 @@ from exugear.report.pictures.scene import DISPLACEMENT_COLOURS, body_colours
 from exugear.report.pictures.shapes import (
     BodyShape,
     TriangleSurface,
-    blank_discs,
     bodies_of,
-    gear_surface,
     largest_displacement,
     motions_of,
+    shapes_at_seats,
     turned,
     vibration_of,
 )
@@ -57,12 +56,11 @@ def drawn_bodies(assembly: Assembly) -> tuple[DrawnBody, ...]:
 
 def rigid_bodies(gearbox: Gearbox) -> tuple[DrawnBody, ...]:
     """List all bodies of a gearbox that have a shape to draw, as rigid ones."""
+    from matplotlib.colors import to_hex
+
     shapes = bodies_of(gearbox)
     colours = body_colours(shapes)
-    return tuple(
-        DrawnBody(shape, "#" + "".join(f"{round(255 * channel):02x}" for channel in colours[shape.family]), shape.name)
-        for shape in shapes
-    )
+    return tuple(DrawnBody(shape, to_hex(colours[shape.family]), shape.name) for shape in shapes)
 
 
 def _elastic(assembly: Assembly, colours: dict[str, str]) -> list[DrawnBody]:
@@ -79,13 +77,7 @@ def _elastic(assembly: Assembly, colours: dict[str, str]) -> list[DrawnBody]:
         shape = BodyShape(body.name, body.family, TriangleSurface(surface.points, triangles), centre, body.fixed)
         colour = colours.get(body.family, "#a0a8b0")
         drawn.append(DrawnBody(shape, colour, body.name, surface.displacement))
-        for gear, z in {} if body.fixed else body.wheels.items():
-            place = np.array([*body.axis, z])
-            teeth = gear_surface(assembly.gearbox.gears[gear]).moved(place)
-            drawn.append(DrawnBody(BodyShape(gear, gear, teeth, place), colour, body.name))
-        for seat, (z, disc) in blank_discs(assembly.gearbox, body).items():
-            place = np.array([*body.axis, z])
-            drawn.append(DrawnBody(BodyShape(seat, seat, disc, place), colour, body.name))
+        drawn += [DrawnBody(seated, colour, body.name) for seated in shapes_at_seats(assembly.gearbox, body)]
     return drawn
 
 
