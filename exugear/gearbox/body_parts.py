@@ -119,9 +119,9 @@ def _computed_inertia(origin: Origin, family: str, section: BodySection) -> Iner
             start += tube.length
         places = blank_places(origin.case, family)
         for name, blank in shape.blanks.items():
-            if name in places:  # faults_of_blanks reports the others
-                ring = MassProperties(blank.mass_kg, blank.axial_kg_m2, blank.transverse_kg_m2, MM * places[name])
-                rings.append(ring)
+            if name in places:  # `errors_of_blanks` reports the others
+                place = MM * places[name]
+                rings.append(MassProperties(blank.mass_kg, blank.axial_kg_m2, blank.transverse_kg_m2, place))
     for name, z in section.gears_z_mm.items():
         if name in origin.case.gears and not (shape is not None and name in shape.blanks):
             tubes.append(gear_tube(origin.case.gears[name], MM * z, tubes))
@@ -357,12 +357,8 @@ def _couplings_on_fixed_bodies(origin: Origin, bodies: Mapping[str, Body]) -> It
             continue
         on, body = sorted(section.bodies, key=lambda body: not origin.case.bodies[body].fixed)
         seat = origin.case.bearings.get(section.seat or "")
-        place = bodies[body].centre_of_mass_z
-        if seat is not None:
-            place = si(seat, "z_mm")
-        damping = section.damping_N_m_s_per_rad
-        if damping is None:
-            damping = damping_times(origin.case.damping).coupling * section.stiffness_N_m_per_rad
+        place = bodies[body].centre_of_mass_z if seat is None else si(seat, "z_mm")
+        damping = _coupling_damping(origin, section)
         yield Bearing(
             name=name,
             family=name,
@@ -594,12 +590,17 @@ def couplings(origin: Origin, spinning: Sequence[str], bearing_names: Sequence[s
         if section.seat is not None and section.seat not in bearing_names:
             known = ", ".join(bearing_names)
             raise origin.error(f"{key}.seat = {section.seat!r}: no such bearing; bearings are {known}")
-        damping = section.damping_N_m_s_per_rad
-        if damping is None:
-            damping = damping_times(origin.case.damping).coupling * section.stiffness_N_m_per_rad
+        damping = _coupling_damping(origin, section)
         return (Coupling(name, *section.bodies, section.seat, section.stiffness_N_m_per_rad, damping),)
 
     return parts_of_each(convert_section, origin.case.couplings)
+
+
+def _coupling_damping(origin: Origin, section: CouplingSection) -> float:
+    """Return the torsional damping of a coupling (N m s/rad), by default in proportion to its stiffness."""
+    if section.damping_N_m_s_per_rad is not None:
+        return section.damping_N_m_s_per_rad
+    return damping_times(origin.case.damping).coupling * section.stiffness_N_m_per_rad
 
 
 def _stands_aside(origin: Origin, key: str, section: MountSection | CouplingSection) -> bool:

@@ -124,11 +124,9 @@ def errors_of_size(named_bodies: Mapping[str, Body], elements: Mapping[str, Sequ
 def errors_of_overall(case: GearboxFile, spinning: Sequence[str]) -> Iterator[str]:
     """Yield errors for an overall input or output that cannot rotate, or that is the same body although gears exist."""
     overall = case.overall
-    for key in ("input", "output"):
-        if getattr(overall, key) not in spinning:
-            yield (
-                f"overall.{key} = {getattr(overall, key)!r}: no such rotating body; bodies are {', '.join(spinning)}"
-            )
+    for key, body in (("input", overall.input), ("output", overall.output)):
+        if body not in spinning:
+            yield f"overall.{key} = {body!r}: no such rotating body; bodies are {', '.join(spinning)}"
             return
     if overall.input == overall.output and case.gears:
         yield f"overall.output = {overall.output!r}: is also the input; set the body at the other end"
@@ -364,19 +362,16 @@ def errors_of_supports(case: GearboxFile) -> Iterator[str]:
 
 def _bearings_at_one_place(bearings: Mapping[str, BearingSection]) -> Iterator[str]:
     """Yield errors for rolling bearings between the same bodies that overlap by half of their width or more."""
-    names = [name for name, bearing in bearings.items() if bearing.catalogue is not None]
-    for place, first in enumerate(names):
-        for second in names[place + 1 :]:
-            bearing = bearings[first]
-            other = bearings[second]
-            distance = abs(bearing.z_mm - other.z_mm)
-            half = 0.5 * sum(section.catalogue.width_mm for section in (bearing, other) if section.catalogue)
-            if (bearing.body, bearing.on) == (other.body, other.on) and distance < 0.5 * half:
-                yield (
-                    f"bearings.{second}.z_mm = {other.z_mm:g}: is at the position of bearings.{first} ({distance:g} "
-                    f"mm apart), and both support {bearing.body} on {bearing.on}; set different positions, or one "
-                    "bearing with an arrangement"
-                )
+    rolling = [(name, bearing) for name, bearing in bearings.items() if bearing.catalogue is not None]
+    for (first, bearing), (second, other) in itertools.combinations(rolling, 2):
+        distance = abs(bearing.z_mm - other.z_mm)
+        half = 0.5 * sum(section.catalogue.width_mm for section in (bearing, other) if section.catalogue)
+        if (bearing.body, bearing.on) == (other.body, other.on) and distance < 0.5 * half:
+            yield (
+                f"bearings.{second}.z_mm = {other.z_mm:g}: is at the position of bearings.{first} ({distance:g} "
+                f"mm apart), and both support {bearing.body} on {bearing.on}; set different positions, or one "
+                "bearing with an arrangement"
+            )
 
 
 def _errors_of_matrix(key: str, section: StiffnessSection | ConnectorDampingSection) -> Iterator[str]:

@@ -160,6 +160,23 @@ def parsed(parse: Callable[[], dict[str, Any]], source: str, form: str) -> dict[
         raise GearboxFileError(error_line(source, f"not valid {form}: {why}")) from None
 
 
+def flattened(content: Mapping[str, Any], before: str = "") -> dict[str, Any]:
+    """Return all values of a file by dotted key.
+
+    Examples
+    --------
+    >>> flattened({"gears": {"sun": {"teeth": 21}}, "name": "GRC"})
+    {'gears.sun.teeth': 21, 'name': 'GRC'}
+    """
+    found: dict[str, Any] = {}
+    for key, value in content.items():
+        if isinstance(value, Mapping):
+            found |= flattened(value, f"{before}{key}.")
+        else:
+            found[f"{before}{key}"] = value
+    return found
+
+
 def parse_case(content: dict[str, Any], source: str) -> GearboxFile:
     """Validate raw content; each error becomes a line of the message.
 
@@ -258,7 +275,7 @@ def _described(errors: list[Any], content: dict[str, Any]) -> Iterator[str]:
     for error in errors:
         path = _path(error["loc"], content)
         key = ".".join(
-            (str(part) if re.fullmatch(r"[A-Za-z0-9_-]{1,60}", str(part)) else shortened(part)) for part in path
+            str(part) if re.fullmatch(r"[A-Za-z0-9_-]{1,60}", str(part)) else shortened(part) for part in path
         )
         if error["type"] == "too_short" and any(loc[:-1][: len(error["loc"])] == error["loc"] for loc in locations):
             continue  # the array is too short only because its entries are invalid
@@ -293,11 +310,9 @@ def _remedy(error: Any) -> str:
     if error["type"] == "extra_forbidden":
         if hint := renamed_hint([str(part) for part in error["loc"]], GEARBOX_RENAMES):
             return hint
-        near = _nearest(error["loc"])
-        known = ", ".join(_known_keys(error["loc"]))
-        if near:
+        if near := _nearest(error["loc"]):
             return f"unknown key; did you mean {near!r}?"
-        return f"unknown key; known keys are {known}"
+        return f"unknown key; known keys are {', '.join(_known_keys(error['loc']))}"
     if error["type"] in _TYPES:
         return _TYPES[error["type"]]
     if error["type"] in ("too_long", "too_short"):

@@ -218,6 +218,12 @@ class Train(
         rows += [coupling_row(self.spins, coupling) for coupling in self.couplings]
         return np.array(rows).reshape(-1, len(self.spins))
 
+    @property
+    def _rows_with_locks(self) -> Floats:
+        """The `spin_rows` and, below them, a row of torque 1 on each locked body."""
+        locks = np.array([[float(name == lock) for name in self.spins] for lock in self.locked])
+        return np.vstack([self.spin_rows, locks.reshape(-1, len(self.spins))])
+
     @cached_property
     def kinematic_modes(self) -> Floats:
         """Basis of the kinematic motions, (spins, degrees of freedom), without mesh closure and coupling twist."""
@@ -366,8 +372,7 @@ class Train(
         """Find forces of constraints and torques of locks in equilibrium with torques, (spin rows + locks,)."""
         self._check_load(torques)
         applied = np.array([torques.get(name, 0.0) for name in self.spins])
-        locks = np.array([[float(name == lock) for name in self.spins] for lock in self.locked])
-        forces = holding_forces(np.vstack([self.spin_rows, locks.reshape(-1, len(self.spins))]), applied)
+        forces = holding_forces(self._rows_with_locks, applied)
         if forces is None:
             raise self.error(
                 f"static_load: locking {', '.join(self.locked) or 'nothing'} does not balance the torques "
@@ -386,8 +391,7 @@ class Train(
         power = sum(torque * speeds[name] for name, torque in self.torques.items())
         sense = math.copysign(1.0, power) * (-1.0 if self.input in self.locked else 1.0)
         drag = -sense * np.sign(without_round_off(np.array([speeds[name] for name in self.spins]), 1.0, 1.0))
-        locks = np.array([[float(name == lock) for name in self.spins] for lock in self.locked])
-        forces = holding_forces(np.vstack([self.spin_rows, locks.reshape(-1, len(self.spins))]), drag)
+        forces = holding_forces(self._rows_with_locks, drag)
         if forces is None:
             return {}
         return dict(zip((mesh.name for mesh in self.meshes), forces.tolist(), strict=False))

@@ -14,6 +14,7 @@ import numpy as np
 
 from exugear.gearbox.choice import Choice, choice_of
 from exugear.gearbox.load_cases import static_load_in_words
+from exugear.gearbox.reading import flattened
 from exugear.gearbox.units import RPM
 from exugear.report.findings.context import (
     MESH_MODEL_LABELS,
@@ -24,7 +25,6 @@ from exugear.report.findings.context import (
 )
 from exugear.report.findings.facts import facts_of
 from exugear.report.findings.groups import RunGroup
-from exugear.report.findings.other_design import flattened
 from exugear.report.findings.result_checks import run_figures, validity_checks
 from exugear.report.findings.words import capitalised
 from exugear.report.pictures.png import png_address
