@@ -344,7 +344,10 @@ def errors_of_torsion(
 
 
 def errors_of_supports(case: GearboxFile) -> Iterator[str]:
-    """Yield errors for stiffness and damping that are not symmetric, indefinite or zero throughout."""
+    """Yield errors for stiffness and damping that are not symmetric, indefinite or zero throughout.
+
+    Rolling bearings between the same bodies that overlap by half of their width or more are errors, too.
+    """
     for table, sections in (("bearings", case.bearings), ("mounts", case.mounts)):
         for name, section in sections.items():
             key = f"{table}.{name}"
@@ -357,12 +360,7 @@ def errors_of_supports(case: GearboxFile) -> Iterator[str]:
                     yield f"{key}.stiffness: is zero in all directions; set at least one above zero"
             if damping is not None:
                 yield from _errors_of_matrix(f"{key}.damping", damping)
-    yield from _bearings_at_one_place(case.bearings)
-
-
-def _bearings_at_one_place(bearings: Mapping[str, BearingSection]) -> Iterator[str]:
-    """Yield errors for rolling bearings between the same bodies that overlap by half of their width or more."""
-    rolling = [(name, bearing) for name, bearing in bearings.items() if bearing.catalogue is not None]
+    rolling = [(name, bearing) for name, bearing in case.bearings.items() if bearing.catalogue is not None]
     for (first, bearing), (second, other) in itertools.combinations(rolling, 2):
         distance = abs(bearing.z_mm - other.z_mm)
         half = 0.5 * sum(section.catalogue.width_mm for section in (bearing, other) if section.catalogue)

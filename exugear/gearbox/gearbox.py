@@ -154,7 +154,11 @@ class Gearbox(ReprMixin):
         0.5
         """
         content = _copied(self.content)
-        made = [dotted for dotted in changes if _makes_entry(content, dotted)]
+        made = []  # keys of named entries that do not exist, such as a gear
+        for dotted in changes:
+            keys = dotted.split(".")
+            if len(keys) > 2 and keys[0] in NAMED_TABLES and keys[1] not in content.get(keys[0], {}):
+                made.append(dotted)
         for dotted, value in changes.items():
             section = content
             *parents, key = dotted.split(".")
@@ -618,12 +622,6 @@ def _errors(gearbox: Gearbox, selected: Iterable[Check]) -> list[str]:
             errors += lines
             failed.add(check.name)
     return errors
-
-
-def _makes_entry(content: Mapping[str, Any], dotted: str) -> bool:
-    """Return whether a key at a dotted path would create a named entry that does not exist, such as a gear."""
-    keys = dotted.split(".")
-    return len(keys) > 2 and keys[0] in NAMED_TABLES and keys[1] not in content.get(keys[0], {})
 
 
 def _copied(value: Any) -> Any:

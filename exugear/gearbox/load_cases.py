@@ -182,7 +182,11 @@ def summarise_loads(
     rolling = gearbox.train.rolling_speeds(reference, 1.0)
     unit = np.array([rolling[name] for name in names])
     axial = _axial_inertias(gearbox, inertias)
-    times = _instants(series, total)
+    times = np.array([0.0, total])
+    if series:  # resolve the torques, including the rows of their file
+        rows = np.concatenate([own for own, _ in series.values()])
+        inside = rows[(rows > 0.0) & (rows < total)]
+        times = np.unique(np.concatenate([np.linspace(0.0, total, INSTANTS), inside]))
     torques = np.zeros((len(times), len(names)))
     for name, torque in case.torques.items():
         torques[:, names.index(name)] += torque
@@ -200,7 +204,7 @@ def summarise_loads(
     net = float(torques[0] @ unit)
     return LoadSummary(
         name=case.name,
-        inertia=inertia_at_input(gearbox, inertias),
+        inertia=float(axial @ unit**2),
         # Round-off of the torques counts as zero.
         net_torque=net if abs(net) > UNLOADED * float(np.abs(torques[0] * unit).max(initial=0.0)) else 0.0,
         driven=case.driven_body is not None,
@@ -481,15 +485,6 @@ def inertia_at_input(gearbox: Gearbox, inertias: str | None = None) -> float:
     unit = gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
     speeds = np.array([unit[name] for name in gearbox.spinning])
     return float(_axial_inertias(gearbox, inertias) @ speeds**2)
-
-
-def _instants(series: Series, total: float) -> Floats:
-    """Instants (s) from 0 to the end that resolve a load case, including the rows of torque series."""
-    if not series:
-        return np.array([0.0, total])
-    lines = np.concatenate([times for times, _ in series.values()])
-    inside = lines[(lines > 0.0) & (lines < total)]
-    return np.unique(np.concatenate([np.linspace(0.0, total, INSTANTS), inside]))
 
 
 def _rates(gearbox: Gearbox, case: LoadCase, axial: Floats, torques: Floats) -> tuple[Floats, Floats]:

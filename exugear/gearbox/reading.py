@@ -218,8 +218,16 @@ def readable(content: Mapping[str, Any]) -> GearboxFile:
     >>> list(readable({"name": 3, "gears": {"one": gear, "two": {**gear, "teeth": "20"}}}).gears)
     ['one']
     """
-    found = {table: _valid_entries(content, table) for table in _JUDGED}
-    written = {table: content[table] if isinstance(content.get(table), Mapping) else {} for table in _JUDGED}
+    found: dict[str, dict[str, Any]] = {}
+    written: dict[str, Mapping[str, Any]] = {}
+    for table in _JUDGED:
+        entries = content.get(table, {})
+        written[table] = entries if isinstance(entries, Mapping) else {}
+        found[table] = {}
+        model = _inner(_inner(GearboxFile, table), "")
+        for name, entry in written[table].items():
+            with suppress(ValidationError):
+                found[table][name] = model.model_validate(entry)
     before = -1
     while before != (count := sum(map(len, found.values()))):
         before = count
@@ -251,17 +259,6 @@ def readable(content: Mapping[str, Any]) -> GearboxFile:
 
 _JUDGED = ("gears", "pairs", "bodies", "bearings", "mounts")
 """Tables whose entries are validated one by one."""
-
-
-def _valid_entries(content: Mapping[str, Any], table: str) -> dict[str, Any]:
-    """Entries of a table that are individually valid."""
-    model = _inner(_inner(GearboxFile, table), "")
-    entries = content.get(table, {})
-    found = {}
-    for name, entry in entries.items() if isinstance(entries, Mapping) else ():
-        with suppress(ValidationError):
-            found[name] = model.model_validate(entry)
-    return found
 
 
 def _described(errors: list[Any], content: dict[str, Any]) -> Iterator[str]:

@@ -369,8 +369,21 @@ class Train(
         return found | {name: abs(float(force)) for name, force in zip(self.locked, reactions, strict=True)}
 
     def _holding(self, torques: Mapping[str, float]) -> Floats:
-        """Find forces of constraints and torques of locks in equilibrium with torques, (spin rows + locks,)."""
-        self._check_load(torques)
+        """Find forces of constraints and torques of locks in equilibrium with torques, (spin rows + locks,).
+
+        Loads and locks on bodies that cannot rotate, and more locks than degrees of freedom, are errors.
+        """
+        for key, names in (("torques_N_m", tuple(torques)), ("locked", self.locked)):
+            for name in names:
+                if name not in self.spins:
+                    raise self.error(
+                        f"static_load.{key} = {name!r}: no such rotating body; bodies are {', '.join(self.spins)}"
+                    )
+        if _rank(self._modes_of(self.locked)) < len(self.locked):
+            raise self.error(
+                f"static_load.locked = {list(self.locked)}: more bodies than the degrees of freedom of the train ("
+                f"{self.degrees_of_freedom}), load sharing is undetermined; remove one"
+            )
         applied = np.array([torques.get(name, 0.0) for name in self.spins])
         forces = holding_forces(self._rows_with_locks, applied)
         if forces is None:
@@ -395,20 +408,6 @@ class Train(
         if forces is None:
             return {}
         return dict(zip((mesh.name for mesh in self.meshes), forces.tolist(), strict=False))
-
-    def _check_load(self, torques: Mapping[str, float]) -> None:
-        """Raise an error for loads and locks on bodies that cannot rotate, or more locks than degrees of freedom."""
-        for key, names in (("torques_N_m", tuple(torques)), ("locked", self.locked)):
-            for name in names:
-                if name not in self.spins:
-                    raise self.error(
-                        f"static_load.{key} = {name!r}: no such rotating body; bodies are {', '.join(self.spins)}"
-                    )
-        if _rank(self._modes_of(self.locked)) < len(self.locked):
-            raise self.error(
-                f"static_load.locked = {list(self.locked)}: more bodies than the degrees of freedom of the train ("
-                f"{self.degrees_of_freedom}), load sharing is undetermined; remove one"
-            )
 
     def _standing(self, body: str) -> tuple[str, ...]:
         """Bodies that are stationary while `body` rotates in a train of several degrees of freedom: the locked ones.

@@ -223,7 +223,7 @@ def kinematics(gearbox: Gearbox) -> dict[str, Any]:
             "body": name,
             "speed_rpm": spin / RPM,
             "ratio": spin / (speed * RPM),
-            "key": f"bodies.{_family(gearbox, name)}",
+            "key": f"bodies.{gearbox.named_bodies[name].family}",
         }
         for name, spin in spins.items()
     ]
@@ -244,11 +244,6 @@ def kinematics(gearbox: Gearbox) -> dict[str, Any]:
         "speeds": table_data(SPEEDS, speeds, legend=legend),
         "frequencies": table_data(FREQUENCIES, meshes[::-1], legend=legend),
     }
-
-
-def _family(gearbox: Gearbox, name: str) -> str:
-    body = gearbox.named_bodies.get(name)
-    return name if body is None else body.family
 
 
 def dynamics(modes: Modes) -> dict[str, Any]:

@@ -8,14 +8,7 @@ from operator import attrgetter
 from pathlib import Path
 
 from exugear.cli.case import check_allow_dir
-from exugear.cli.console import (
-    BadInputError,
-    FailedError,
-    interruption,
-    model_errors,
-    note,
-    progress_bar,
-)
+from exugear.cli.console import BadInputError, FailedError, interruption, model_errors, note, progress_bar
 from exugear.cli.resonances import highest_resonance, resonance_table
 from exugear.cli.tables import Column, Outcome, Table
 from exugear.cli.watched import WatchedProject
@@ -87,9 +80,7 @@ def report(
             raise BadInputError(error) from error
     if not stored:
         _compute_missing(folder, allow_dir)
-    study = None
-    if changes.levers:
-        study = _design_changes(folder, allow_dir, changes)
+    study = _design_changes(folder, allow_dir, changes) if changes.levers else None
     try:
         with (
             time_noted(folder, "report"),

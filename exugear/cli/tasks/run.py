@@ -82,15 +82,11 @@ def run(
     comparison = None
     if compared is not None and finished.complete:
         with time_noted(project.folder, f"comparison with Exudyn, {choice.variant}"):
-            comparison = _compare(project, compared, kept)
+            try:
+                comparison = project.compare_with_exudyn(compared, **kept)
+            except (RunError, LimitError, FileError) as error:
+                raise FailedError(f"comparison with Exudyn: {error}") from error
     _outcome(project.gearbox.source, finished, comparison, command, said).show(as_json, whole)
-
-
-def _compare(project: Project, duration: float, kept: Mapping[str, float]) -> SolverComparison:
-    try:
-        return project.compare_with_exudyn(duration, **kept)
-    except (RunError, LimitError, FileError) as error:
-        raise FailedError(f"comparison with Exudyn: {error}") from error
 
 
 def load_case_of(project: Project) -> LoadCase:

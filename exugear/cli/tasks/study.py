@@ -11,13 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from exugear.cli.case import check_allow_dir, check_choice
-from exugear.cli.console import (
-    BadInputError,
-    FailedError,
-    interruption,
-    make_results_folder,
-    progress_bar,
-)
+from exugear.cli.console import BadInputError, FailedError, interruption, make_results_folder, progress_bar
 from exugear.cli.process import let_in_dask
 from exugear.cli.tables import Column, Outcome, Table, failure_text, significant
 from exugear.gearbox.named_files import Permissions

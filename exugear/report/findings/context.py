@@ -173,7 +173,16 @@ def stored_models(context: Context) -> StoredResults:
             tables[name] = fitting_table(context.gearbox, name, context.folder)
         except TableError as error:
             context.notes.left_out.append(f"table of {name}: {error}")
-    return StoredResults(tables, dict(_stored_modes(context)), ())
+    modes = {}
+    for path in sorted(context.folder.glob("*/*/modes.nc")):
+        try:
+            data = load_modes(path)
+        except FileError as error:
+            context.notes.left_out.append(str(error))
+            continue
+        if _fits(context, path, data.attrs):
+            modes[choice_of(data.attrs)] = data
+    return StoredResults(tables, modes, ())
 
 
 def with_responses(context: Context, models: StoredResults) -> StoredResults:
@@ -241,17 +250,6 @@ def _is_replaced(gearbox: Gearbox, name: str, digest: str) -> bool:
         return file_digest(recording_path(gearbox, name)) != digest
     except (GearboxFileError, FileError):
         return False
-
-
-def _stored_modes(context: Context) -> Iterator[tuple[Choice, xr.Dataset]]:
-    for path in sorted(context.folder.glob("*/*/modes.nc")):
-        try:
-            data = load_modes(path)
-        except FileError as error:
-            context.notes.left_out.append(str(error))
-            continue
-        if _fits(context, path, data.attrs):
-            yield choice_of(data.attrs), data
 
 
 def _stored_runs(context: Context, modes: Mapping[Choice, xr.Dataset]) -> Iterator[VariantRun]:

@@ -341,7 +341,10 @@ def elastic_scene(assembly: Assembly, shape: Floats, *, title: str = "", amplitu
         raise ValueError("the mode does not deform the flexible bodies")
     factor = amplitude * max(float(np.ptp(surface.points[:, 2])) for surface, _, _ in deformed) / largest
     densities = np.concatenate([density for _, _, density in deformed])
-    areas = np.concatenate([_areas(surface.points, surface.quads) for surface, _, _ in deformed])
+    corners = [surface.points[surface.quads] for surface, _, _ in deformed]
+    diagonals = [(own[:, 2] - own[:, 0], own[:, 3] - own[:, 1]) for own in corners]
+    areas = np.concatenate([0.5 * np.linalg.norm(np.cross(*own), axis=1) for own in diagonals])
+    # The density that all but the brightest part of the surface stays below
     order = np.argsort(densities)
     share = np.cumsum(areas[order]) / areas.sum()
     brightest = float(densities[order][np.searchsorted(share, BRIGHTEST / 100.0)]) or 1.0
@@ -361,13 +364,6 @@ def elastic_scene(assembly: Assembly, shape: Floats, *, title: str = "", amplitu
         motions=tuple(motions),
         title=title,
     )
-
-
-def _areas(points: Floats, quads: Integers) -> Floats:
-    """Return the area of each quad, m2."""
-    diagonals = points[quads[:, 2]] - points[quads[:, 0]], points[quads[:, 3]] - points[quads[:, 1]]
-    areas: Floats = 0.5 * np.linalg.norm(np.cross(*diagonals), axis=1)
-    return areas
 
 
 def draw_elastic_bodies(

@@ -22,7 +22,7 @@ from exugear.report.sections.material import ReportData, model_name, source_word
 from exugear.report.web.document import rounded
 from exugear.report.web.stage import stage_data
 from exugear.results.spectra.run_spectra import ModeReport, VariantRun, report_mode
-from exugear.results.spectra.waterfall import OrderLine, Waterfall
+from exugear.results.spectra.waterfall import Waterfall
 from fe_ste.tools.arrays import Floats
 
 if TYPE_CHECKING:
@@ -136,22 +136,23 @@ ALSO = 4
 def run_data(material: ReportData) -> dict[str, Any]:
     """Return the script data of all run-ups, steady-state responses and modes: ``lines``, ``groups``, ``models``."""
     modes = material.results.modes
+    lines = []
+    for line in material.lines:
+        number, _, family = line.name.rpartition(" × ")
+        lines.append(
+            {
+                "name": line.name,
+                "short": material.words.line(line),
+                "sentence": material.words.line_sentence(line),
+                "order": line.order,
+                "harmonic": int(number) if number else 1,
+                "family": family,
+            }
+        )
     return {
-        "lines": [_line(material, line) for line in material.lines],
+        "lines": lines,
         "groups": [_group(material, group) for group in material.groups],
         "models": {model_name(model): _model(material, model, data) for model, data in modes.items()},
-    }
-
-
-def _line(material: ReportData, line: OrderLine) -> dict[str, Any]:
-    number, _, family = line.name.rpartition(" × ")
-    return {
-        "name": line.name,
-        "short": material.words.line(line),
-        "sentence": material.words.line_sentence(line),
-        "order": line.order,
-        "harmonic": int(number) if number else 1,
-        "family": family,
     }
 
 

@@ -190,8 +190,35 @@ def bodies_data(bodies: tuple[DrawnBody, ...], labels: Mapping[str, str], arrays
     # A rotor with given inertias only has no shape to draw; the view is then empty.
     points = np.concatenate([np.zeros((0, 3)), *(body.shape.surface.points for body in bodies)])
     low, high = (points.min(axis=0), points.max(axis=0)) if bodies else (np.zeros(3), np.ones(3))
+    firsts: dict[str, DrawnBody] = {}
+    listed = []
+    for body in bodies:
+        # Each shape is stored once, with points in 16 bits of its bounding box: 15 µm per metre.
+        first = firsts.setdefault(body.shape.family, body)
+        turn = turn_between(first.shape, body.shape)
+        drawn = body if turn is None else first
+        local = drawn.shape.surface.points - drawn.shape.reference
+        start = local.min(axis=0)
+        span = np.maximum(np.ptp(local, axis=0), 1e-9)
+        kind = "u2" if len(local) <= _U16 else "u4"
+        listed.append(
+            {
+                "name": body.shape.name,
+                "label": labels.get(body.shape.name, body.shape.name),
+                "owner": body.owner,
+                "fixed": body.shape.fixed,
+                "elastic": body.field is not None,
+                "colour": body.colour,
+                "reference": rounded_list(body.shape.reference, 7),
+                "turn": rounded(turn or 0.0, 8),
+                "low": rounded_list(start, 7),
+                "span": rounded_list(span, 7),
+                "points": arrays.add(np.round((local - start) / span * _U16).astype("u2"), differences=True),
+                "triangles": arrays.add(drawn.shape.surface.triangles.astype(kind), differences=True),
+            }
+        )
     return {
-        "bodies": _bodies(bodies, labels, arrays),
+        "bodies": listed,
         "centre": rounded_list(0.5 * (low + high), 6),
         "diagonal": rounded(float(np.linalg.norm(high - low)), 6),
         "amplitude": LARGEST,
@@ -225,35 +252,3 @@ def motions_data(
 def _parts(amplitudes: Complexes) -> Floats:
     """Return real and imaginary parts along a new first axis."""
     return np.stack([amplitudes.real, amplitudes.imag])
-
-
-def _bodies(bodies: tuple[DrawnBody, ...], labels: Mapping[str, str], arrays: ArrayStore) -> list[dict[str, Any]]:
-    """Return each shape once, with points in 16 bits of its bounding box: 15 µm per metre."""
-    firsts: dict[str, DrawnBody] = {}
-    listed = []
-    for body in bodies:
-        first = firsts.setdefault(body.shape.family, body)
-        turn = turn_between(first.shape, body.shape)
-        drawn = body if turn is None else first
-        local = drawn.shape.surface.points - drawn.shape.reference
-        low = local.min(axis=0)
-        span = np.maximum(np.ptp(local, axis=0), 1e-9)
-        triangles = drawn.shape.surface.triangles
-        kind = "u2" if len(local) <= _U16 else "u4"
-        listed.append(
-            {
-                "name": body.shape.name,
-                "label": labels.get(body.shape.name, body.shape.name),
-                "owner": body.owner,
-                "fixed": body.shape.fixed,
-                "elastic": body.field is not None,
-                "colour": body.colour,
-                "reference": rounded_list(body.shape.reference, 7),
-                "turn": rounded(turn or 0.0, 8),
-                "low": rounded_list(low, 7),
-                "span": rounded_list(span, 7),
-                "points": arrays.add(np.round((local - low) / span * _U16).astype("u2"), differences=True),
-                "triangles": arrays.add(triangles.astype(kind), differences=True),
-            }
-        )
-    return listed
