@@ -84,8 +84,7 @@ def command_line(gearbox: Gearbox, folder: Path, verb: str, model: Choice) -> st
 
 def _scope(material: ReportData) -> str:
     gearbox = material.context.gearbox
-    rated = gearbox.case.operation.rated_speed_rpm
-    parts = [] if rated is None else [f"rated {rated:g} rpm"]
+    parts = [] if material.rated_rpm is None else [f"rated {material.rated_rpm:g} rpm"]
     parts += [material.words.labelled(static_load_in_words(gearbox)), gearbox.train.ratio_text]
     if material.headline is not None:
         parts += [Variant.of(material.headline.choice.variant).label, material.headline.source]
@@ -180,9 +179,15 @@ def write_report(
         steady=material.headline is not None and material.headline.response is not None,
         source=material.file_words,
     )
-    rated = gearbox.case.operation.rated_speed_rpm
-    head: dict[str, Any] = {"name": gearbox.name, "input": material.input_words, "rated": rated}
-    data = {**head, "lines": [], "groups": [], "models": {}, "charts": material.charts}
+    data: dict[str, Any] = {
+        "name": gearbox.name,
+        "input": material.input_words,
+        "rated": material.rated_rpm,
+        "lines": [],
+        "groups": [],
+        "models": {},
+        "charts": material.charts,
+    }
     for part in parts:
         data |= part.data
     title = f"{gearbox.name}: resonance report"
@@ -190,17 +195,15 @@ def write_report(
     page = whole_page(title, body, "report", data, material.arrays, LIBRARIES)
     write_file(path, page.encode("utf-8", "replace"))
     ranked = () if material.headline is None else material.headline.ranking.resonances
-    resonances = tuple(resonance.summary() for resonance in ranked)
-    notes = context.notes
     return Report(
         path,
-        tuple(notes.statements),
-        resonances,
+        tuple(context.notes.statements),
+        tuple(resonance.summary() for resonance in ranked),
         material.missing,
-        tuple(notes.left_out),
+        tuple(context.notes.left_out),
         gearbox,
         material.headline,
-        tuple(notes.findings),
+        tuple(context.notes.findings),
         material.design_study,
     )
 

@@ -64,18 +64,16 @@ def report(
         raise BadInputError(f"{folder}: no such folder; specify the results folder of exugear run")
     if not changes.levers and (changes.resonance is not None or changes.loads):
         raise BadInputError("--resonance and --load are for design changes: add --levers")
+    permissions = Permissions(below=allow_dir)
     for load in changes.loads:  # before long work
-        at_load(read_stored_gearbox(folder, Permissions(below=allow_dir)), load)
+        at_load(read_stored_gearbox(folder, permissions), load)
     other = None if compare is None else _results_of(compare)
     if other is not None and not other.is_dir():
         raise BadInputError(f"{other}: --compare: no such folder; specify the results folder of another design")
     if other is not None:
         # Another design that cannot be compared is refused before anything is computed.
-        permissions = Permissions(below=allow_dir)
-        own = read_stored_gearbox(folder, permissions)
-        others = read_stored_gearbox(other, permissions)
         try:
-            check_ranges(own, others)
+            check_ranges(read_stored_gearbox(folder, permissions), read_stored_gearbox(other, permissions))
         except ReportError as error:
             raise BadInputError(error) from error
     if not stored:

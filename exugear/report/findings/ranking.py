@@ -292,7 +292,6 @@ def resonances(data: xr.Dataset, quantity: str | None = None) -> pd.DataFrame:
         One row a resonance: order, input speed, frequency; amplitude, rank (empty without a peak) and bearing or mount
         of each quantity, and its amplitudes with the lowest and the highest plausible damping. SI units, speeds in rpm.
 
-
     Examples
     --------
     >>> import numpy as np

@@ -164,7 +164,7 @@ def _kicker(headline: Headline) -> str:
 
 
 def _off_rated(material: ReportData, resonance: Resonance) -> str:
-    rated = material.context.gearbox.case.operation.rated_speed_rpm
+    rated = material.rated_rpm
     if rated is None:
         return ""
     off = abs(resonance.speed) / RPM / rated - 1.0
@@ -212,8 +212,8 @@ def _strips(
         f"{number}: {rounded_text(own.frequency)} Hz at {speed_text(own)}"
         for number, own in enumerate(headline.ranking.resonances[:SHOWN], start=1)
     )
-    rated = material.context.gearbox.case.operation.rated_speed_rpm
-    return strips_of(headline.ranking, curves, titles, rated, size, f"Largest order over speed. {peaks}.")
+    words = f"Largest order over speed. {peaks}."
+    return strips_of(headline.ranking, curves, titles, material.rated_rpm, size, words)
 
 
 def _resonance_box(material: ReportData, headline: Headline, mode: MatchedMode | None) -> Box:
@@ -311,7 +311,7 @@ def _further(
         yield "Requirements not met", lines
     if leaders := list(_leaders(material, headline, top)):
         yield "Highest in other quantities", leaders
-    rated = material.context.gearbox.case.operation.rated_speed_rpm
+    rated = material.rated_rpm
     if rated is not None and curves:
         yield f"At rated speed, {rounded_text(rated)} rpm", _rated_lines(headline, curves, rated)
     if headline.response is not None and (sound := sound_over_speed(headline.response)) is not None:

@@ -85,6 +85,11 @@ class ReportData:
         return self.words.of(self.context.gearbox.case.overall.input)
 
     @property
+    def rated_rpm(self) -> float | None:
+        """Rated speed of the overall input, rpm; None if the file has none."""
+        return self.context.gearbox.case.operation.rated_speed_rpm
+
+    @property
     def file_words(self) -> str:
         """Gearbox file with its folder only, as the page may be passed on and should not show local paths."""
         return "/".join(Path(self.context.gearbox.source).parts[-2:])

@@ -253,7 +253,7 @@ def _run_rows(
 
 
 def _first_cells(material: ReportData, number: int, own: ListedResonance) -> dict[str, object]:
-    rated = material.context.gearbox.case.operation.rated_speed_rpm
+    rated = material.rated_rpm
     rpm = own.speed / RPM
     row: dict[str, object] = {
         "No.": Cell(str(number), number, tag="rank"),
@@ -306,17 +306,20 @@ def _drawn(
     if not inside:
         return {**evaluated, "campbell": []}
     drawn = tuple(Resonance(own.line.name, own.line.order, own.speed, own.frequency, {}) for own in inside)
-    matched = {number: own.mode for number, own in enumerate(inside, start=1) if own.mode is not None}
-    frequencies = np.zeros(0) if modes is None else modes["frequency"].to_numpy()
+    frequencies = np.zeros(0)
+    matched: dict[int, int] = {}
+    if modes is not None:
+        frequencies = modes["frequency"].to_numpy()
+        matched = {number: own.mode for number, own in enumerate(inside, start=1) if own.mode is not None}
     # One line for each mesh, and those of the circles.
     single = [line for line in material.lines if " × " not in line.name]
     orders = {round(line.order, 6): line for line in [*(own.line for own in inside), *single]}
     lines = [(line, material.words.line(line)) for _, line in sorted(orders.items())]
-    rated = material.context.gearbox.case.operation.rated_speed_rpm
     words = "Orders are lines through the origin, modes are horizontal lines; circles have the numbers of the list."
     shown = replace(ranking, resonances=drawn)
-    known = matched if modes is not None else {}
-    drawings = [campbell_drawing(shown, lines, frequencies, known, rated, size, words) for size in CAMPBELL]
+    drawings = [
+        campbell_drawing(shown, lines, frequencies, matched, material.rated_rpm, size, words) for size in CAMPBELL
+    ]
     return {**evaluated, "campbell": drawings}
 
 
@@ -372,16 +375,15 @@ SAME_SPEED = 0.02
 def _response(material: ReportData, data: xr.Dataset) -> dict[str, Any]:
     context = material.context
     choice = choice_of(data.attrs)
-    level = str(data.attrs["method"])
     runs = [run for run in material.results.runs if choice_of(run.attributes) == choice]
     label = response_label(data)
     context.tell(f"steady-state response, {label}")
-    found = peaks(data)[:PEAKS]
+    found = peaks(data)
     rates = {}
     for run in runs:
         stored, _ = read_run(run.path, ("time", "input_speed"))
         rates[str(run.attributes["load_case"])] = sweep_rate(stored["time"], stored["input_speed"], 1.0)
-    rows = [_row(material, peak, data, rates) for peak in found]
+    rows = [_row(material, peak, data, rates) for peak in found[:PEAKS]]
     lost = [row for row in rows if any(value == TOO_FAST for value in row.values())]
     warnings = [
         f"the run-up of the load case {run.attributes['load_case']} has another load ({run.attributes['load']}), which "
@@ -394,7 +396,7 @@ def _response(material: ReportData, data: xr.Dataset) -> dict[str, Any]:
             f"run-ups are too fast for {len(lost)} of the {len(rows)} highest peaks and underestimate them."
         )
     context.notes.statements.extend(f"Steady-state response, {label}: {warning}" for warning in warnings)
-    name = f"{level}-{model_name(choice)}"
+    name = f"{data.attrs['method']}-{model_name(choice)}"
     # Responses over speed are in the list and in the diagrams; continuations turn back and have their own.
     apart = not is_over_speed(data)
     return {
@@ -420,7 +422,7 @@ def _response(material: ReportData, data: xr.Dataset) -> dict[str, Any]:
         "campbell": _campbell(material, data, f"campbell-{name}", label),
         "sound": sound_power(material, data, f"sound-{name}"),
         "ranges": list(_ranges(context)),
-        "sidebands": Table(_sidebands(material, data, peaks(data)), ("sideband", "cause"), name=f"sidebands-{name}"),
+        "sidebands": Table(_sidebands(material, data, found), ("sideband", "cause"), name=f"sidebands-{name}"),
         "passages": material.words.labelled(_passages(context, _carriers(context))),
     }
 
