@@ -67,8 +67,12 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     GearboxFileError
         The file is not a regular file, is empty or too large, or is not TOML (with line and column).
     """
-    text = read_text(path).replace("\r\n", "\n").replace("\r", "\n")
-    return parsed_toml(text, str(path))
+    return parsed_toml(plain_lines(read_text(path)), str(path))
+
+
+def plain_lines(text: str) -> str:
+    """Return a text whose lines all end with a line feed."""
+    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def read_text(path: str | Path) -> str:

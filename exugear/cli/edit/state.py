@@ -24,7 +24,7 @@ from exugear.cli.tasks import check as check_task
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import operating_range
 from exugear.gearbox.named_files import NOTHING_MORE, Permissions
-from exugear.gearbox.reading import GearboxFileError, parsed_toml
+from exugear.gearbox.reading import GearboxFileError, parsed_toml, plain_lines
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.words import Labels
@@ -175,8 +175,7 @@ class Analyst:
         """Read and check a text."""
         content = None
         try:
-            plain = text.replace("\r\n", "\n").replace("\r", "\n")
-            content = parsed_toml(plain, self._source)
+            content = parsed_toml(plain_lines(text), self._source)
             gearbox = checked_gearbox(content, self._source, self._permissions)
             # Errors of loads and of the train are found only when these are used.
             with model_errors():

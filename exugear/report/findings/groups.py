@@ -358,9 +358,8 @@ def _named(finding: Finding, data: xr.Dataset) -> Finding:
 def _level_at(spectra: Waterfall, peak: Pick) -> float:
     near = np.abs(peak.line.frequency(spectra.speed) - peak.frequency) <= peak.resolution
     level = spectra.along(peak.line)[near]
-    if np.isfinite(level).any():
-        return float(np.max(level, initial=-np.inf, where=np.isfinite(level)))
-    return float("nan")
+    known = level[np.isfinite(level)]
+    return float(known.max()) if known.size else math.nan
 
 
 # Channels in addition to the overall transmission error: forces of bearings, joints and meshes, from either source
@@ -369,8 +368,6 @@ OVERLAP = 0.5
 """Overlap of successive windows, as a fraction; sufficient for waterfalls coarser than that of the TE."""
 SAMPLED = 8
 """Stride of the samples from which force amplitudes are estimated."""
-MEAN_PART = slice(1, 2)
-"""Third of the run for mean forces: the middle one, without start-up and highest speeds."""
 AXIAL = "z"
 """Axis of the axial force of a bearing."""
 
@@ -500,8 +497,9 @@ def _standing_for(names: Sequence[str], swings: Floats, words: Labels) -> Iterat
 
 
 def _middle(values: Floats) -> Floats:
+    """Return the middle third of a run, without start-up and highest speeds, for mean forces."""
     third = len(values) // 3
-    return values[MEAN_PART.start * third : MEAN_PART.stop * third] if third else values
+    return values[third : 2 * third] if third else values
 
 
 def _waterfall(values: Floats, data: _Signals, run: VariantRun, unit: str = "N") -> Waterfall:

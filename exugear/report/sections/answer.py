@@ -78,7 +78,13 @@ def answer_section(material: ReportData) -> Part:
         lines = [fact.line for data in material.results.steady for fact in facts_of_response(material.words, data)]
         notes.extend(lines)
         return Part(render("answer", answer=None, lines=lines), title="Answer", name="answer")
-    scope = _scope(material, headline)
+    gearbox = material.context.gearbox
+    load = material.words.labelled(headline.load or f"static load, {static_load_in_words(gearbox)}")
+    scope = (
+        f"{Variant.of(headline.choice.variant).label}, {headline.source}. Load: {load}. Inertia set: "
+        f"{headline.choice.inertias}. Damping: {damping_in_words(gearbox.case.damping)}. Speeds: of the "
+        f"{material.input_words}."
+    )
     notes.append(f"Results: {scope}")
     top = headline.top
     assert top is not None
@@ -131,16 +137,6 @@ def answer_section(material: ReportData) -> Part:
         for name, curve in drawn.items()
     ]
     return Part(html, {"curves": readout}, "Answer", "answer")
-
-
-def _scope(material: ReportData, headline: Headline) -> str:
-    gearbox = material.context.gearbox
-    load = material.words.labelled(headline.load or f"static load, {static_load_in_words(gearbox)}")
-    return (
-        f"{Variant.of(headline.choice.variant).label}, {headline.source}. Load: {load}. Inertia set: "
-        f"{headline.choice.inertias}. Damping: {damping_in_words(gearbox.case.damping)}. Speeds: of the "
-        f"{material.input_words}."
-    )
 
 
 def amplitude_text(name: str, amplitude: float) -> str:
