@@ -200,6 +200,8 @@ def summarise_loads(
     solved = np.linalg.lstsq(gearbox.train.spin_rows.T, balanced.T, rcond=1e-12)[0]
     forces: Floats = np.asarray(solved[: len(gearbox.meshes)].T)
     fastest = dict(zip(names, np.abs(spins).max(axis=0).tolist(), strict=True))
+    of_body = dict(zip(names, spins.T, strict=True))
+    standing = np.zeros(len(spins))  # speed of bodies without rotation
     flanks, reversed_flanks = _flanks(gearbox, forces)
     net = float(torques[0] @ unit)
     return LoadSummary(
@@ -212,7 +214,12 @@ def summarise_loads(
         end_speed=float(speeds[-1]),
         fastest_speed=fastest[reference],
         rim_speeds={name: fastest[name] * radius for name, radius in rim_radii(gearbox).items()},
-        mesh_frequencies=_highest_mesh_frequencies(gearbox, spins),
+        mesh_frequencies={
+            mesh.name: float(np.abs(of_body.get(mesh.pinion, standing) - of_body.get(mesh.frame, standing)).max())
+            * mesh.pair.pinion.teeth
+            / (2.0 * math.pi)
+            for mesh in gearbox.meshes
+        },
         mesh_forces={mesh.name: float(force) for mesh, force in zip(gearbox.meshes, forces[0], strict=True)},
         flanks=flanks,
         reversed_flanks=reversed_flanks,
@@ -517,18 +524,6 @@ def _speeds(gearbox: Gearbox, case: LoadCase, times: Floats, rates: Floats) -> F
     gained = np.cumsum(0.5 * (rates[1:] + rates[:-1]) * np.diff(times)[:, None], axis=0)
     gained = np.concatenate([np.zeros((1, rates.shape[1])), gained])
     return np.asarray(np.array([start[name] for name in gearbox.spinning]) + gained)
-
-
-def _highest_mesh_frequencies(gearbox: Gearbox, spins: Floats) -> dict[str, float]:
-    """Highest mesh frequency (Hz) of each mesh for speeds (times, bodies); bodies without rotation have zero speed."""
-    of_body = dict(zip(gearbox.spinning, spins.T, strict=True))
-    standing = np.zeros(len(spins))
-    return {
-        mesh.name: float(np.abs(of_body.get(mesh.pinion, standing) - of_body.get(mesh.frame, standing)).max())
-        * mesh.pair.pinion.teeth
-        / (2.0 * math.pi)
-        for mesh in gearbox.meshes
-    }
 
 
 def drive_rate(gearbox: Gearbox, case: LoadCase) -> float:

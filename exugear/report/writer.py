@@ -82,15 +82,6 @@ def command_line(gearbox: Gearbox, folder: Path, verb: str, model: Choice) -> st
     return shlex.join([*words, "--out", shown_path(folder)])
 
 
-def _scope(material: ReportData) -> str:
-    gearbox = material.context.gearbox
-    parts = [] if material.rated_rpm is None else [f"rated {material.rated_rpm:g} rpm"]
-    parts += [material.words.labelled(static_load_in_words(gearbox)), gearbox.train.ratio_text]
-    if material.headline is not None:
-        parts += [Variant.of(material.headline.choice.variant).label, material.headline.source]
-    return f"{capitalised(', '.join(parts))}."
-
-
 # The report of a results folder as a self-contained web page
 
 SECTIONS: Final[tuple[Callable[[ReportData], Part], ...]] = (
@@ -169,11 +160,15 @@ def write_report(
     if compare is not None:
         material = replace(material, other_design=read_other_design(context, material.headline, compare))
     parts = [section(material) for section in SECTIONS]
+    scope = [] if material.rated_rpm is None else [f"rated {material.rated_rpm:g} rpm"]
+    scope += [material.words.labelled(static_load_in_words(gearbox)), gearbox.train.ratio_text]
+    if material.headline is not None:
+        scope += [Variant.of(material.headline.choice.variant).label, material.headline.source]
     # The body is made last, because sections add notes that its head shows.
     body = render(
         "report",
         name=gearbox.name,
-        scope=_scope(material),
+        scope=f"{capitalised(', '.join(scope))}.",
         parts=[part for part in parts if part.html],
         notes=context.notes,
         steady=material.headline is not None and material.headline.response is not None,

@@ -159,8 +159,16 @@ class Analyst:
             yield {"step": "dynamics", "failed": True, "remarks": [asdict(remark) for remark in errors]}
 
     def _pictured(self, bodies: tuple[DrawnBody, ...], labels: Mapping[str, str]) -> dict[str, Any]:
-        """Return the step ``picture``; most changes of a text leave it as it was."""
-        geometry = _digest(bodies, labels)
+        """Return the step ``picture``; most changes of a text leave it as it was.
+
+        The digest of the shapes and labels is the name of the geometry.
+        """
+        digest = hashlib.sha256(repr(sorted(labels.items())).encode())
+        for body in bodies:
+            digest.update(f"{body.shape.name} {body.owner} {body.colour} {body.shape.fixed}".encode())
+            for values in (body.shape.surface.points, body.shape.surface.triangles, body.shape.reference):
+                digest.update(np.ascontiguousarray(values).tobytes())
+        geometry = digest.hexdigest()[:16]
         if self._picture["geometry"] != geometry:
             arrays = ArrayStore(f"{geometry}-", level=1)
             stage = bodies_data(bodies, labels, arrays)
@@ -332,16 +340,6 @@ def motions(modes: Modes, bodies: tuple[DrawnBody, ...]) -> dict[str, Any]:
     arrays = ArrayStore(f"{shapes}-", level=1)
     stage = motions_data(modes.assembly, tuple(map(_thinned, bodies)), modes.shapes, arrays)
     return {"stage": stage, "arrays": arrays.packed()}
-
-
-def _digest(bodies: Iterable[DrawnBody], labels: Mapping[str, str]) -> str:
-    """Return a name for the shapes of bodies."""
-    digest = hashlib.sha256(repr(sorted(labels.items())).encode())
-    for body in bodies:
-        digest.update(f"{body.shape.name} {body.owner} {body.colour} {body.shape.fixed}".encode())
-        for values in (body.shape.surface.points, body.shape.surface.triangles, body.shape.reference):
-            digest.update(np.ascontiguousarray(values).tobytes())
-    return digest.hexdigest()[:16]
 
 
 def _thinned(body: DrawnBody) -> DrawnBody:
