@@ -219,8 +219,7 @@ def errors_of_planets(
             continue
         if any({mesh.pinion, mesh.gear} == {planet.name, other.name} for mesh in meshes):
             continue
-        collision = next(_collisions(case, planet, other, gears), None)
-        if collision is not None:
+        if collision := next(_collisions(case, planet, other, gears), None):
             reported.add((planet.family, other.family))
             yield collision
     for family in case.bodies:

@@ -13,7 +13,7 @@ from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import REFERENCE_VARIANT, Context
 from exugear.report.findings.groups import RankedResonance, RunGroup
 from exugear.report.findings.headline import headline_of_group
-from exugear.report.findings.parameter_variations import BestChange, ModelVariations, best_change
+from exugear.report.findings.parameter_variations import BestChange, ModelVariations, best_change, variations_of
 from exugear.report.findings.words import Labels, capitalised, figure_text
 from exugear.results.spectra.waterfall import order_lines
 from exugear.steady.peaks import peaks
@@ -176,8 +176,7 @@ def _loudest(context: Context, words: Labels, group: RunGroup) -> SummaryCard | 
         with_all = "" if group.responses else " with all window lengths"
         said = f"No resonance found up to {speed_text(highest)}{with_all}."
         return SummaryCard(HIGHEST, "none", "found", said, "ranking")
-    unseen = _unseen(context, words, group, top)
-    if unseen is not None:
+    if unseen := _unseen(context, words, group, top):
         return unseen
     source = ", constant speed" if group.responses else ""
     if not group.responses and top.constant is not None:
@@ -291,7 +290,7 @@ def shift_text(sensitivity: FrequencySensitivity) -> str:
 def _amplitude_reductions(
     words: Labels, group: RunGroup, modes: xr.Dataset, mode: int, variations: Sequence[ModelVariations]
 ) -> tuple[str, ...]:
-    own = next((one.variations for one in variations if one.choice == group.choice(group.main)), ())
+    own = variations_of(variations, group.choice(group.main))
     if not own:
         return ()
     frequency = float(modes["frequency"][mode])

@@ -130,6 +130,11 @@ def _figures(parameter: Parameter) -> Figures | str:
     return found.frequency, found.share, found.amplification, found.damping_ratio
 
 
+def variations_of(variations: Sequence[ModelVariations], choice: Choice) -> tuple[ParameterVariation, ...]:
+    """Return the variations of one model; none if it is not varied."""
+    return next((one.variations for one in variations if one.choice == choice), ())
+
+
 def default_place(variation: ParameterVariation) -> int:
     """Return the index of the gearbox file's value among the values of a variation."""
     return int(np.argmin(np.abs(np.array(variation.parameter.values) - variation.parameter.default)))

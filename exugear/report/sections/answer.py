@@ -15,7 +15,7 @@ from exugear.report.findings.context import excitations
 from exugear.report.findings.facts import MOST_WORDS, facts_of_response, short
 from exugear.report.findings.headline import Headline, MatchedMode, causes_of, contributions_of
 from exugear.report.findings.margins import shortfalls_of
-from exugear.report.findings.parameter_variations import default_place, track_mode
+from exugear.report.findings.parameter_variations import default_place, track_mode, variations_of
 from exugear.report.findings.ranking import Envelope, Resonance, envelopes
 from exugear.report.findings.words import QUANTITIES, capitalised, percentages, rounded_text
 from exugear.report.pictures.png import png_address
@@ -405,9 +405,8 @@ def _doubts(material: ReportData, headline: Headline, top: Resonance) -> Iterato
                 f"{amplitude_text(quantity, first.amplitudes[quantity].amplitude)}."
             )
     mode = headline.mode_of(top)
-    own = next((one.variations for one in material.variations if one.choice == headline.choice), ())
-    for variation in own:
-        label, _, unit = material.words.parameter(variation.parameter.label).partition(" / ")
+    for variation in variations_of(material.variations, headline.choice):
+        label = material.words.parameter(variation.parameter.label).partition(" / ")[0]
         if mode is None or not label.startswith("housing"):
             continue
         seen = track_mode(variation, mode.frequency).frequency

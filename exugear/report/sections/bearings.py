@@ -55,8 +55,7 @@ def bearings_section(material: ReportData) -> Part:
     lives = [_rated_variant(material, data) for data in material.ratings.lives]
     data = {} if material.ratings.sheet is None else {"rating": material.ratings.sheet.summary()}
     for life in material.ratings.lives:
-        worst = limits(life)
-        if worst:
+        if worst := limits(life):
             part, kind, damage = worst[0]
             size = "infinite" if math.isinf(damage) else f"{damage:.3g}"
             material.context.notes.statements.append(
@@ -65,14 +64,7 @@ def bearings_section(material: ReportData) -> Part:
             )
     if not (forces or accelerations or duties or lives):
         return Part(data=data)
-    html = render(
-        "bearings",
-        forces=forces,
-        accelerations=accelerations,
-        seats=SEATS,
-        duties=duties,
-        lives=lives,
-    )
+    html = render("bearings", forces=forces, accelerations=accelerations, seats=SEATS, duties=duties, lives=lives)
     return Part(html, data, "Bearings and life", "bearings")
 
 

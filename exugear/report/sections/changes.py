@@ -25,7 +25,7 @@ from exugear.report.findings.facts import best_words, sensitivities_of, shift_te
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.headline import Headline, headline_of_group
 from exugear.report.findings.other_design import change_in_decibels, highest_within
-from exugear.report.findings.parameter_variations import best_change, track_mode
+from exugear.report.findings.parameter_variations import best_change, track_mode, variations_of
 from exugear.report.findings.proposals import ASSUMPTION
 from exugear.report.findings.words import QUANTITIES, figure_text, rounded_text
 from exugear.report.sections.material import ChartAxis, Curve, Part, ReportData
@@ -254,7 +254,7 @@ def _sensitivity(material: ReportData, group: RunGroup) -> dict[str, Any] | None
         f"For the mode at {frequency:.1f} Hz {Variant.of(group.main).label}, inertia set {group.inertias}: "
         f"{material.words.moves(modes, mode)}."
     )
-    varied = next((one.variations for one in material.variations if one.choice == own.choice), ())
+    varied = variations_of(material.variations, own.choice)
     sensitivities = sensitivities_of(material.words, modes, mode)
     largest = max((abs(sensitivity.shift) for sensitivity in sensitivities), default=1.0)
     kinds = [
