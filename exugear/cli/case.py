@@ -90,15 +90,13 @@ def check_choice(gearbox: Gearbox, choice: Choice, folder: Path) -> None:
     if choice.load_case is not None and choice.load_case not in gearbox.load_cases:
         known = ", ".join(gearbox.load_cases) or "none"
         raise gearbox.error(f"no load case {choice.load_case!r}; choose one of: {known}")
-    reason = lacking(gearbox, choice.variant)
-    if reason:
+    if reason := lacking(gearbox, choice.variant):
         raise gearbox.error(f"variant {choice.variant}: {reason}")
     if choice.variant.is_elastic:
         check_solids(gearbox, bodies_folder(folder))
-    if LAWS[choice.mesh_model].needs_axes:
-        without = without_table(gearbox, [mesh.pair.name for mesh in gearbox.meshes])
-        if without:
-            raise BadInputError(gearbox.error(without))
+    pairs = [mesh.pair.name for mesh in gearbox.meshes]
+    if LAWS[choice.mesh_model].needs_axes and (without := without_table(gearbox, pairs)):
+        raise BadInputError(gearbox.error(without))
     if not LAWS[choice.mesh_model].has_force and not choice.variant.spins_only:
         raise BadInputError(
             f"--mesh-model {choice.mesh_model}: a kinematic constraint, which requires --variant rigid, not "

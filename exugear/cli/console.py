@@ -22,13 +22,7 @@ from types import FrameType
 from typing import Any, NoReturn
 
 from rich.console import Console, RenderableType
-from rich.progress import (
-    BarColumn,
-    Progress,
-    ProgressColumn,
-    Task,
-    TaskProgressColumn,
-)
+from rich.progress import BarColumn, Progress, ProgressColumn, Task, TaskProgressColumn
 from rich.table import Column
 from rich.text import Text
 
@@ -318,30 +312,22 @@ def model_errors() -> Iterator[None]:
     try:
         yield
     except Exception as error:
-        user = _user_error(error)
-        if user is None:
+        if not type(error).__module__.startswith("exugear."):
             raise
-        raise user from error
+        # Imported only after an error, because a successful command need not load these modules.
+        from exugear.gearbox.reading import GearboxFileError
+        from exugear.gearbox.variant import VariantError
+        from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
+        from exugear.steady.mean_system.planet_sets import SteadyError
+        from exugear.system.bearings.rolling.rows import BearingError
+        from exugear.system.statics import BalanceError
+        from exugear.system.tooth_mesh.placement import MeshError
 
-
-def _user_error(error: Exception) -> Exception | None:
-    """Return the command-line error for an error of the model; None for any other error."""
-    if not type(error).__module__.startswith("exugear."):
-        return None
-    # Imported only after an error, because a successful command need not load these modules.
-    from exugear.gearbox.reading import GearboxFileError
-    from exugear.gearbox.variant import VariantError
-    from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
-    from exugear.steady.mean_system.planet_sets import SteadyError
-    from exugear.system.bearings.rolling.rows import BearingError
-    from exugear.system.statics import BalanceError
-    from exugear.system.tooth_mesh.placement import MeshError
-
-    if isinstance(error, (GearboxFileError, VariantError, MeshError, BearingError, SteadyError)):
-        return BadInputError(error)
-    if isinstance(error, (BalanceError, HarmonicBalanceError)):
-        return FailedError(error)
-    return None
+        if isinstance(error, (GearboxFileError, VariantError, MeshError, BearingError, SteadyError)):
+            raise BadInputError(error) from error
+        if isinstance(error, (BalanceError, HarmonicBalanceError)):
+            raise FailedError(error) from error
+        raise
 
 
 def not_converged_failure(meshes: Sequence[str]) -> str:

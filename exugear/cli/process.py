@@ -49,7 +49,12 @@ def standard_streams() -> Iterator[None]:
     The code is 141, without a message, if the reader of standard output has closed the pipe, and 1 with a message if
     the output is full or closed. Text that cannot be written to standard error is dropped.
     """
-    _take_closed_numbers()
+    # Closed streams are replaced, so that no other file receives their descriptors and the output sent to them.
+    for number, mode in enumerate((os.O_RDONLY, os.O_RDONLY, os.O_WRONLY)):  # writing to standard output fails
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, mode)  # uses the lowest free descriptor, which is this one
     sys.stdout, sys.stderr = output, _ = _lasting(sys.stdout, 1), _lasting(sys.stderr, 2)
     try:
         yield
@@ -61,15 +66,6 @@ def standard_streams() -> Iterator[None]:
                 sys.exit(EXIT_UNREAD)
             end_with("Failed", f"standard output: {failure.strerror}", EXIT_FAILED)
         raise
-
-
-def _take_closed_numbers() -> None:
-    """Replace closed streams, so that no other file receives their descriptors and the output sent to them."""
-    for number, mode in enumerate((os.O_RDONLY, os.O_RDONLY, os.O_WRONLY)):  # writing to standard output fails
-        try:
-            os.fstat(number)
-        except OSError:
-            os.open(os.devnull, mode)  # uses the lowest free descriptor, which is this one
 
 
 def _lasting(stream: TextIO | None, number: int) -> TextIO:

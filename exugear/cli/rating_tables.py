@@ -71,7 +71,10 @@ def rating_outcome(sheet: RatingSheet, case: str, name: str) -> Outcome:
     flanks = sorted(sheet.flanks, key=lambda flank: _value("S_H", flank))
     title = f"{sheet.edition}, method B; {sheet.load}"
     smallest = ", ".join(_smallest(flanks, symbol) for symbol in ("S_H", "S_F") if flanks)
-    remarks = dict.fromkeys(line for flank in sheet.flanks for line in _remarks(flank))
+    remarks: dict[str, None] = {}
+    for flank in sheet.flanks:
+        remarks |= dict.fromkeys(f"{flank.family}: {name} {reason}" for name, reason in flank.lacking.items())
+        remarks |= dict.fromkeys(f"{flank.gear} in {flank.family}: {remark}" for remark in flank.remarks)
     factors = [
         Table(f"Mesh {mesh}", [*_rows(own, sheet.other_edition)], [Column("factor", _factor), *map(_column, own)])
         for mesh, own in _meshes(sheet)
@@ -128,11 +131,6 @@ def _column(flank: FlankSheet) -> Column:
         return Column(name, name, form).cell({name: sheet_value(name, getattr(flank, part).get(name, math.nan))})
 
     return Column("\n".join(wrapped(f"{flank.gear} {flank.flank}", GEAR_COLUMN)), shown)
-
-
-def _remarks(sheet: FlankSheet) -> Iterator[str]:
-    yield from (f"{sheet.family}: {name} {reason}" for name, reason in sheet.lacking.items())
-    yield from (f"{sheet.gear} in {sheet.family}: {remark}" for remark in sheet.remarks)
 
 
 def rate(case: Path, out: Path | None, allow_dir: Path | None, as_json: bool, whole: bool) -> None:

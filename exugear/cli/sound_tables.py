@@ -68,7 +68,3 @@ def sound_tables(sound: Mapping[str, Any]) -> list[Table]:
 
 def _speed(sound: Mapping[str, Any]) -> str:
     return significant(sound["speed_rpm"], 3)
-
-
-def _modes(own: Mapping[str, Any]) -> str:
-    return shares((f"{value:.0f} Hz", share) for value, share in own["modes"])

@@ -119,9 +119,9 @@ def _computed_inertia(origin: Origin, family: str, section: BodySection) -> Iner
             start += tube.length
         places = blank_places(origin.case, family)
         for name, blank in shape.blanks.items():
-            if name in places:  # faults_of_blanks reports the others
-                ring = MassProperties(blank.mass_kg, blank.axial_kg_m2, blank.transverse_kg_m2, MM * places[name])
-                rings.append(ring)
+            if name in places:  # `errors_of_blanks` reports the others
+                place = MM * places[name]
+                rings.append(MassProperties(blank.mass_kg, blank.axial_kg_m2, blank.transverse_kg_m2, place))
     for name, z in section.gears_z_mm.items():
         if name in origin.case.gears and not (shape is not None and name in shape.blanks):
             tubes.append(gear_tube(origin.case.gears[name], MM * z, tubes))
@@ -170,7 +170,10 @@ def gear_tube(gear: GearSection, z: float, shaft: Sequence[Tube]) -> Tube:
 
 
 def _axis(origin: Origin, family: str, angle: float) -> tuple[float, float]:
-    """Position (x, y) of a body's axis, m; for a planet, at its angle on the carrier (rad)."""
+    """Position (x, y) of a body's axis, m; for a planet, at its angle on the carrier (rad).
+
+    A body without a position of its own is shown at a coupled body, or else at the origin.
+    """
     section = origin.case.bodies[family]
     if section.axis_position_mm is not None:
         x, y = section.axis_position_mm
@@ -178,7 +181,13 @@ def _axis(origin: Origin, family: str, angle: float) -> tuple[float, float]:
     carrier = section.carrier
     radius = section.orbit_radius_mm
     if carrier is None or radius is None:
-        return _axis_of_neighbour(origin, family)
+        for coupling in origin.case.couplings.values():
+            for other in coupling.bodies:
+                neighbour = origin.case.bodies.get(other)
+                if family in coupling.bodies and neighbour is not None and neighbour.axis_position_mm is not None:
+                    x, y = neighbour.axis_position_mm
+                    return x * MM, y * MM
+        return 0.0, 0.0
     if not origin.are_enabled(f"bodies.{family}.carrier", carrier):
         raise origin.error(f"bodies.{family}.carrier = {carrier!r}: that body is not enabled")
     if origin.case.bodies[carrier].axis_position_mm is None:
@@ -188,17 +197,6 @@ def _axis(origin: Origin, family: str, angle: float) -> tuple[float, float]:
         )
     x, y = _axis(origin, carrier, 0.0)
     return x + radius * MM * math.cos(angle), y + radius * MM * math.sin(angle)
-
-
-def _axis_of_neighbour(origin: Origin, family: str) -> tuple[float, float]:
-    """Position at which to show a body without one of its own: that of a coupled body, or else the origin."""
-    for coupling in origin.case.couplings.values():
-        for other in coupling.bodies:
-            section = origin.case.bodies.get(other)
-            if family in coupling.bodies and section is not None and section.axis_position_mm is not None:
-                x, y = section.axis_position_mm
-                return x * MM, y * MM
-    return 0.0, 0.0
 
 
 def pin_offsets(origin: Origin, bodies: Mapping[str, Body]) -> dict[str, tuple[float, float]]:
@@ -285,16 +283,14 @@ def joints(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Joint, ...]:
             for suffix, body, on in origin.instances(key, section.body, section.on)
         )
 
-    return parts_of_each(convert_section, origin.case.joints or dict(_usual_joints(origin)))
-
-
-def _usual_joints(origin: Origin) -> Iterator[tuple[str, JointSection]]:
-    for name, section in origin.enabled.items():
+    sections = dict(origin.case.joints)
+    for name, body in origin.enabled.items() if not sections else ():
         held = [bearing.z_mm for bearing in origin.case.bearings.values() if bearing.body == name]
-        places = held or list(section.gears_z_mm.values())
-        if places and not section.fixed and not section.spin_only:
+        places = held or list(body.gears_z_mm.values())
+        if places and not body.fixed and not body.spin_only:
             place = sum(places) / len(places)
-            yield name, JointSection.model_construct(body=name, on=section.carrier or GROUND, z_mm=place)
+            sections[name] = JointSection.model_construct(body=name, on=body.carrier or GROUND, z_mm=place)
+    return parts_of_each(convert_section, sections)
 
 
 def bearings(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Bearing, ...]:
@@ -357,12 +353,8 @@ def _couplings_on_fixed_bodies(origin: Origin, bodies: Mapping[str, Body]) -> It
             continue
         on, body = sorted(section.bodies, key=lambda body: not origin.case.bodies[body].fixed)
         seat = origin.case.bearings.get(section.seat or "")
-        place = bodies[body].centre_of_mass_z
-        if seat is not None:
-            place = si(seat, "z_mm")
-        damping = section.damping_N_m_s_per_rad
-        if damping is None:
-            damping = damping_times(origin.case.damping).coupling * section.stiffness_N_m_per_rad
+        place = bodies[body].centre_of_mass_z if seat is None else si(seat, "z_mm")
+        damping = _coupling_damping(origin, section)
         yield Bearing(
             name=name,
             family=name,
@@ -594,12 +586,17 @@ def couplings(origin: Origin, spinning: Sequence[str], bearing_names: Sequence[s
         if section.seat is not None and section.seat not in bearing_names:
             known = ", ".join(bearing_names)
             raise origin.error(f"{key}.seat = {section.seat!r}: no such bearing; bearings are {known}")
-        damping = section.damping_N_m_s_per_rad
-        if damping is None:
-            damping = damping_times(origin.case.damping).coupling * section.stiffness_N_m_per_rad
+        damping = _coupling_damping(origin, section)
         return (Coupling(name, *section.bodies, section.seat, section.stiffness_N_m_per_rad, damping),)
 
     return parts_of_each(convert_section, origin.case.couplings)
+
+
+def _coupling_damping(origin: Origin, section: CouplingSection) -> float:
+    """Return the torsional damping of a coupling (N m s/rad), by default in proportion to its stiffness."""
+    if section.damping_N_m_s_per_rad is not None:
+        return section.damping_N_m_s_per_rad
+    return damping_times(origin.case.damping).coupling * section.stiffness_N_m_per_rad
 
 
 def _stands_aside(origin: Origin, key: str, section: MountSection | CouplingSection) -> bool:

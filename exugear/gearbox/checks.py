@@ -124,11 +124,9 @@ def errors_of_size(named_bodies: Mapping[str, Body], elements: Mapping[str, Sequ
 def errors_of_overall(case: GearboxFile, spinning: Sequence[str]) -> Iterator[str]:
     """Yield errors for an overall input or output that cannot rotate, or that is the same body although gears exist."""
     overall = case.overall
-    for key in ("input", "output"):
-        if getattr(overall, key) not in spinning:
-            yield (
-                f"overall.{key} = {getattr(overall, key)!r}: no such rotating body; bodies are {', '.join(spinning)}"
-            )
+    for key, body in (("input", overall.input), ("output", overall.output)):
+        if body not in spinning:
+            yield f"overall.{key} = {body!r}: no such rotating body; bodies are {', '.join(spinning)}"
             return
     if overall.input == overall.output and case.gears:
         yield f"overall.output = {overall.output!r}: is also the input; set the body at the other end"
@@ -221,8 +219,7 @@ def errors_of_planets(
             continue
         if any({mesh.pinion, mesh.gear} == {planet.name, other.name} for mesh in meshes):
             continue
-        collision = next(_collisions(case, planet, other, gears), None)
-        if collision is not None:
+        if collision := next(_collisions(case, planet, other, gears), None):
             reported.add((planet.family, other.family))
             yield collision
     for family in case.bodies:
@@ -346,7 +343,10 @@ def errors_of_torsion(
 
 
 def errors_of_supports(case: GearboxFile) -> Iterator[str]:
-    """Yield errors for stiffness and damping that are not symmetric, indefinite or zero throughout."""
+    """Yield errors for stiffness and damping that are not symmetric, indefinite or zero throughout.
+
+    Rolling bearings between the same bodies that overlap by half of their width or more are errors, too.
+    """
     for table, sections in (("bearings", case.bearings), ("mounts", case.mounts)):
         for name, section in sections.items():
             key = f"{table}.{name}"
@@ -359,24 +359,16 @@ def errors_of_supports(case: GearboxFile) -> Iterator[str]:
                     yield f"{key}.stiffness: is zero in all directions; set at least one above zero"
             if damping is not None:
                 yield from _errors_of_matrix(f"{key}.damping", damping)
-    yield from _bearings_at_one_place(case.bearings)
-
-
-def _bearings_at_one_place(bearings: Mapping[str, BearingSection]) -> Iterator[str]:
-    """Yield errors for rolling bearings between the same bodies that overlap by half of their width or more."""
-    names = [name for name, bearing in bearings.items() if bearing.catalogue is not None]
-    for place, first in enumerate(names):
-        for second in names[place + 1 :]:
-            bearing = bearings[first]
-            other = bearings[second]
-            distance = abs(bearing.z_mm - other.z_mm)
-            half = 0.5 * sum(section.catalogue.width_mm for section in (bearing, other) if section.catalogue)
-            if (bearing.body, bearing.on) == (other.body, other.on) and distance < 0.5 * half:
-                yield (
-                    f"bearings.{second}.z_mm = {other.z_mm:g}: is at the position of bearings.{first} ({distance:g} "
-                    f"mm apart), and both support {bearing.body} on {bearing.on}; set different positions, or one "
-                    "bearing with an arrangement"
-                )
+    rolling = [(name, bearing) for name, bearing in case.bearings.items() if bearing.catalogue is not None]
+    for (first, bearing), (second, other) in itertools.combinations(rolling, 2):
+        distance = abs(bearing.z_mm - other.z_mm)
+        half = 0.5 * sum(section.catalogue.width_mm for section in (bearing, other) if section.catalogue)
+        if (bearing.body, bearing.on) == (other.body, other.on) and distance < 0.5 * half:
+            yield (
+                f"bearings.{second}.z_mm = {other.z_mm:g}: is at the position of bearings.{first} ({distance:g} "
+                f"mm apart), and both support {bearing.body} on {bearing.on}; set different positions, or one "
+                "bearing with an arrangement"
+            )
 
 
 def _errors_of_matrix(key: str, section: StiffnessSection | ConnectorDampingSection) -> Iterator[str]:

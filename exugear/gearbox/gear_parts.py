@@ -8,7 +8,7 @@ from dataclasses import fields, replace
 from decimal import Decimal
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -65,10 +65,10 @@ def gears(origin: Origin) -> dict[str, Gear]:
         A gear cannot be built; the message names its key.
     """
     plain = {name: _unchecked(name, section) for name, section in origin.case.gears.items()}
-    shifted = {**plain, **part_of_each(partial(_with_shift, origin, plain), _flagged(origin, "shift"))}
+    unstated = _flagged(origin, "profile_shift_from_centre_distance")
+    shifted = plain | part_of_each(partial(_with_shift, origin, plain), unstated)
     shifted = {name: with_usual_rounding(origin.case.gears[name], gear) for name, gear in shifted.items()}
-    fitted = {**shifted, **part_of_each(partial(_with_fitted_tip, origin, shifted), _flagged(origin, "tip"))}
-
+    fitted = shifted | part_of_each(partial(_with_fitted_tip, origin, shifted), _flagged(origin, "fitted_tip"))
     fitted |= _without_rounded_overlaps(origin, fitted)
 
     def convert_section(name: str, section: GearSection) -> Gear:
@@ -114,9 +114,8 @@ def smaller_roundings(origin: Origin, gears: Mapping[str, Gear]) -> Iterator[str
             )
 
 
-def _flagged(origin: Origin, what: Literal["shift", "tip"]) -> dict[str, GearSection]:
-    """Sections of gears whose profile shift or tip diameter follows from their mating gears."""
-    key = {"shift": "profile_shift_from_centre_distance", "tip": "fitted_tip"}[what]
+def _flagged(origin: Origin, key: str) -> dict[str, GearSection]:
+    """Sections of gears whose profile shift or tip diameter follows from their mating gears, as a key says."""
     return {name: section for name, section in origin.case.gears.items() if getattr(section, key)}
 
 
@@ -447,8 +446,8 @@ def _stiffness_over_cycle(section: MeshStiffnessSection) -> Floats:
     """Sample the stiffness over the mesh cycle, N/m: from the file, or a sum of harmonics for cubic interpolation."""
     if section.over_cycle_N_per_m is not None:
         return np.array(section.over_cycle_N_per_m)
-    highest = max(len(section.cosine_N_per_m), len(section.sine_N_per_m))
-    angle = 2.0 * np.pi * np.arange(max(1, SAMPLES_PER_WAVE * highest)) / max(1, SAMPLES_PER_WAVE * highest)
+    count = max(1, SAMPLES_PER_WAVE * len(section.cosine_N_per_m), SAMPLES_PER_WAVE * len(section.sine_N_per_m))
+    angle = 2.0 * np.pi * np.arange(count) / count
     values = np.full(angle.shape, section.mean_N_per_m, dtype=np.float64)
     for waves, function in ((section.cosine_N_per_m, np.cos), (section.sine_N_per_m, np.sin)):
         for order, amplitude in enumerate(waves, start=1):

@@ -11,7 +11,7 @@ import difflib
 import inspect
 import math
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -38,6 +38,7 @@ from exugear.gearbox.parts import (
 from exugear.gearbox.reading import (
     GearboxFileError,
     Origin,
+    flattened,
     parse_case,
     parsed_toml,
     read_text,
@@ -153,7 +154,11 @@ class Gearbox(ReprMixin):
         0.5
         """
         content = _copied(self.content)
-        made = [dotted for dotted in changes if _makes_entry(content, dotted)]
+        made = []  # keys of named entries that do not exist, such as a gear
+        for dotted in changes:
+            keys = dotted.split(".")
+            if len(keys) > 2 and keys[0] in NAMED_TABLES and keys[1] not in content.get(keys[0], {}):
+                made.append(dotted)
         for dotted, value in changes.items():
             section = content
             *parents, key = dotted.split(".")
@@ -168,7 +173,7 @@ class Gearbox(ReprMixin):
         except GearboxFileError as error:
             if not made:
                 raise
-            near = difflib.get_close_matches(made[0], list(_paths(self.content)), 1, 0.0)
+            near = difflib.get_close_matches(made[0], list(flattened(self.content)), 1, 0.0)
             raise self.error(
                 f"{made[0]}: the file has no entry of this name, and a new one lacks keys; did you mean {near[0]}?"
             ) from error
@@ -617,21 +622,6 @@ def _errors(gearbox: Gearbox, selected: Iterable[Check]) -> list[str]:
             errors += lines
             failed.add(check.name)
     return errors
-
-
-def _makes_entry(content: Mapping[str, Any], dotted: str) -> bool:
-    """Return whether a key at a dotted path would create a named entry that does not exist, such as a gear."""
-    keys = dotted.split(".")
-    return len(keys) > 2 and keys[0] in NAMED_TABLES and keys[1] not in content.get(keys[0], {})
-
-
-def _paths(content: Mapping[str, Any], before: str = "") -> Iterator[str]:
-    """Yield the dotted paths of all keys whose value is not a section."""
-    for key, value in content.items():
-        if isinstance(value, Mapping):
-            yield from _paths(value, f"{before}{key}.")
-        else:
-            yield f"{before}{key}"
 
 
 def _copied(value: Any) -> Any:

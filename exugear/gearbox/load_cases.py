@@ -182,7 +182,11 @@ def summarise_loads(
     rolling = gearbox.train.rolling_speeds(reference, 1.0)
     unit = np.array([rolling[name] for name in names])
     axial = _axial_inertias(gearbox, inertias)
-    times = _instants(series, total)
+    times = np.array([0.0, total])
+    if series:  # resolve the torques, including the rows of their file
+        rows = np.concatenate([own for own, _ in series.values()])
+        inside = rows[(rows > 0.0) & (rows < total)]
+        times = np.unique(np.concatenate([np.linspace(0.0, total, INSTANTS), inside]))
     torques = np.zeros((len(times), len(names)))
     for name, torque in case.torques.items():
         torques[:, names.index(name)] += torque
@@ -196,11 +200,13 @@ def summarise_loads(
     solved = np.linalg.lstsq(gearbox.train.spin_rows.T, balanced.T, rcond=1e-12)[0]
     forces: Floats = np.asarray(solved[: len(gearbox.meshes)].T)
     fastest = dict(zip(names, np.abs(spins).max(axis=0).tolist(), strict=True))
+    of_body = dict(zip(names, spins.T, strict=True))
+    standing = np.zeros(len(spins))  # speed of bodies without rotation
     flanks, reversed_flanks = _flanks(gearbox, forces)
     net = float(torques[0] @ unit)
     return LoadSummary(
         name=case.name,
-        inertia=inertia_at_input(gearbox, inertias),
+        inertia=float(axial @ unit**2),
         # Round-off of the torques counts as zero.
         net_torque=net if abs(net) > UNLOADED * float(np.abs(torques[0] * unit).max(initial=0.0)) else 0.0,
         driven=case.driven_body is not None,
@@ -208,7 +214,12 @@ def summarise_loads(
         end_speed=float(speeds[-1]),
         fastest_speed=fastest[reference],
         rim_speeds={name: fastest[name] * radius for name, radius in rim_radii(gearbox).items()},
-        mesh_frequencies=_highest_mesh_frequencies(gearbox, spins),
+        mesh_frequencies={
+            mesh.name: float(np.abs(of_body.get(mesh.pinion, standing) - of_body.get(mesh.frame, standing)).max())
+            * mesh.pair.pinion.teeth
+            / (2.0 * math.pi)
+            for mesh in gearbox.meshes
+        },
         mesh_forces={mesh.name: float(force) for mesh, force in zip(gearbox.meshes, forces[0], strict=True)},
         flanks=flanks,
         reversed_flanks=reversed_flanks,
@@ -483,15 +494,6 @@ def inertia_at_input(gearbox: Gearbox, inertias: str | None = None) -> float:
     return float(_axial_inertias(gearbox, inertias) @ speeds**2)
 
 
-def _instants(series: Series, total: float) -> Floats:
-    """Instants (s) from 0 to the end that resolve a load case, including the rows of torque series."""
-    if not series:
-        return np.array([0.0, total])
-    lines = np.concatenate([times for times, _ in series.values()])
-    inside = lines[(lines > 0.0) & (lines < total)]
-    return np.unique(np.concatenate([np.linspace(0.0, total, INSTANTS), inside]))
-
-
 def _rates(gearbox: Gearbox, case: LoadCase, axial: Floats, torques: Floats) -> tuple[Floats, Floats]:
     """Angular accelerations (rad/s2) of the kinematic gear train and added machine torques (N m), both (times, bodies).
 
@@ -522,18 +524,6 @@ def _speeds(gearbox: Gearbox, case: LoadCase, times: Floats, rates: Floats) -> F
     gained = np.cumsum(0.5 * (rates[1:] + rates[:-1]) * np.diff(times)[:, None], axis=0)
     gained = np.concatenate([np.zeros((1, rates.shape[1])), gained])
     return np.asarray(np.array([start[name] for name in gearbox.spinning]) + gained)
-
-
-def _highest_mesh_frequencies(gearbox: Gearbox, spins: Floats) -> dict[str, float]:
-    """Highest mesh frequency (Hz) of each mesh for speeds (times, bodies); bodies without rotation have zero speed."""
-    of_body = dict(zip(gearbox.spinning, spins.T, strict=True))
-    standing = np.zeros(len(spins))
-    return {
-        mesh.name: float(np.abs(of_body.get(mesh.pinion, standing) - of_body.get(mesh.frame, standing)).max())
-        * mesh.pair.pinion.teeth
-        / (2.0 * math.pi)
-        for mesh in gearbox.meshes
-    }
 
 
 def drive_rate(gearbox: Gearbox, case: LoadCase) -> float:

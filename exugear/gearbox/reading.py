@@ -67,8 +67,12 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     GearboxFileError
         The file is not a regular file, is empty or too large, or is not TOML (with line and column).
     """
-    text = read_text(path).replace("\r\n", "\n").replace("\r", "\n")
-    return parsed_toml(text, str(path))
+    return parsed_toml(plain_lines(read_text(path)), str(path))
+
+
+def plain_lines(text: str) -> str:
+    """Return a text whose lines all end with a line feed."""
+    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def read_text(path: str | Path) -> str:
@@ -160,6 +164,23 @@ def parsed(parse: Callable[[], dict[str, Any]], source: str, form: str) -> dict[
         raise GearboxFileError(error_line(source, f"not valid {form}: {why}")) from None
 
 
+def flattened(content: Mapping[str, Any], before: str = "") -> dict[str, Any]:
+    """Return all values of a file by dotted key.
+
+    Examples
+    --------
+    >>> flattened({"gears": {"sun": {"teeth": 21}}, "name": "GRC"})
+    {'gears.sun.teeth': 21, 'name': 'GRC'}
+    """
+    found: dict[str, Any] = {}
+    for key, value in content.items():
+        if isinstance(value, Mapping):
+            found |= flattened(value, f"{before}{key}.")
+        else:
+            found[f"{before}{key}"] = value
+    return found
+
+
 def parse_case(content: dict[str, Any], source: str) -> GearboxFile:
     """Validate raw content; each error becomes a line of the message.
 
@@ -201,8 +222,16 @@ def readable(content: Mapping[str, Any]) -> GearboxFile:
     >>> list(readable({"name": 3, "gears": {"one": gear, "two": {**gear, "teeth": "20"}}}).gears)
     ['one']
     """
-    found = {table: _valid_entries(content, table) for table in _JUDGED}
-    written = {table: content[table] if isinstance(content.get(table), Mapping) else {} for table in _JUDGED}
+    found: dict[str, dict[str, Any]] = {}
+    written: dict[str, Mapping[str, Any]] = {}
+    for table in _JUDGED:
+        entries = content.get(table, {})
+        written[table] = entries if isinstance(entries, Mapping) else {}
+        found[table] = {}
+        model = _inner(_inner(GearboxFile, table), "")
+        for name, entry in written[table].items():
+            with suppress(ValidationError):
+                found[table][name] = model.model_validate(entry)
     before = -1
     while before != (count := sum(map(len, found.values()))):
         before = count
@@ -236,17 +265,6 @@ _JUDGED = ("gears", "pairs", "bodies", "bearings", "mounts")
 """Tables whose entries are validated one by one."""
 
 
-def _valid_entries(content: Mapping[str, Any], table: str) -> dict[str, Any]:
-    """Entries of a table that are individually valid."""
-    model = _inner(_inner(GearboxFile, table), "")
-    entries = content.get(table, {})
-    found = {}
-    for name, entry in entries.items() if isinstance(entries, Mapping) else ():
-        with suppress(ValidationError):
-            found[name] = model.model_validate(entry)
-    return found
-
-
 def _described(errors: list[Any], content: dict[str, Any]) -> Iterator[str]:
     """Yield key, value and remedy of each error; a key that was misspelt is not reported as missing in addition."""
     meant = set()
@@ -258,7 +276,7 @@ def _described(errors: list[Any], content: dict[str, Any]) -> Iterator[str]:
     for error in errors:
         path = _path(error["loc"], content)
         key = ".".join(
-            (str(part) if re.fullmatch(r"[A-Za-z0-9_-]{1,60}", str(part)) else shortened(part)) for part in path
+            str(part) if re.fullmatch(r"[A-Za-z0-9_-]{1,60}", str(part)) else shortened(part) for part in path
         )
         if error["type"] == "too_short" and any(loc[:-1][: len(error["loc"])] == error["loc"] for loc in locations):
             continue  # the array is too short only because its entries are invalid
@@ -293,11 +311,9 @@ def _remedy(error: Any) -> str:
     if error["type"] == "extra_forbidden":
         if hint := renamed_hint([str(part) for part in error["loc"]], GEARBOX_RENAMES):
             return hint
-        near = _nearest(error["loc"])
-        known = ", ".join(_known_keys(error["loc"]))
-        if near:
+        if near := _nearest(error["loc"]):
             return f"unknown key; did you mean {near!r}?"
-        return f"unknown key; known keys are {known}"
+        return f"unknown key; known keys are {', '.join(_known_keys(error['loc']))}"
     if error["type"] in _TYPES:
         return _TYPES[error["type"]]
     if error["type"] in ("too_long", "too_short"):

@@ -218,6 +218,12 @@ class Train(
         rows += [coupling_row(self.spins, coupling) for coupling in self.couplings]
         return np.array(rows).reshape(-1, len(self.spins))
 
+    @property
+    def _rows_with_locks(self) -> Floats:
+        """The `spin_rows` and, below them, a row of torque 1 on each locked body."""
+        locks = np.array([[float(name == lock) for name in self.spins] for lock in self.locked])
+        return np.vstack([self.spin_rows, locks.reshape(-1, len(self.spins))])
+
     @cached_property
     def kinematic_modes(self) -> Floats:
         """Basis of the kinematic motions, (spins, degrees of freedom), without mesh closure and coupling twist."""
@@ -363,11 +369,23 @@ class Train(
         return found | {name: abs(float(force)) for name, force in zip(self.locked, reactions, strict=True)}
 
     def _holding(self, torques: Mapping[str, float]) -> Floats:
-        """Find forces of constraints and torques of locks in equilibrium with torques, (spin rows + locks,)."""
-        self._check_load(torques)
+        """Find forces of constraints and torques of locks in equilibrium with torques, (spin rows + locks,).
+
+        Loads and locks on bodies that cannot rotate, and more locks than degrees of freedom, are errors.
+        """
+        for key, names in (("torques_N_m", tuple(torques)), ("locked", self.locked)):
+            for name in names:
+                if name not in self.spins:
+                    raise self.error(
+                        f"static_load.{key} = {name!r}: no such rotating body; bodies are {', '.join(self.spins)}"
+                    )
+        if _rank(self._modes_of(self.locked)) < len(self.locked):
+            raise self.error(
+                f"static_load.locked = {list(self.locked)}: more bodies than the degrees of freedom of the train ("
+                f"{self.degrees_of_freedom}), load sharing is undetermined; remove one"
+            )
         applied = np.array([torques.get(name, 0.0) for name in self.spins])
-        locks = np.array([[float(name == lock) for name in self.spins] for lock in self.locked])
-        forces = holding_forces(np.vstack([self.spin_rows, locks.reshape(-1, len(self.spins))]), applied)
+        forces = holding_forces(self._rows_with_locks, applied)
         if forces is None:
             raise self.error(
                 f"static_load: locking {', '.join(self.locked) or 'nothing'} does not balance the torques "
@@ -386,25 +404,10 @@ class Train(
         power = sum(torque * speeds[name] for name, torque in self.torques.items())
         sense = math.copysign(1.0, power) * (-1.0 if self.input in self.locked else 1.0)
         drag = -sense * np.sign(without_round_off(np.array([speeds[name] for name in self.spins]), 1.0, 1.0))
-        locks = np.array([[float(name == lock) for name in self.spins] for lock in self.locked])
-        forces = holding_forces(np.vstack([self.spin_rows, locks.reshape(-1, len(self.spins))]), drag)
+        forces = holding_forces(self._rows_with_locks, drag)
         if forces is None:
             return {}
         return dict(zip((mesh.name for mesh in self.meshes), forces.tolist(), strict=False))
-
-    def _check_load(self, torques: Mapping[str, float]) -> None:
-        """Raise an error for loads and locks on bodies that cannot rotate, or more locks than degrees of freedom."""
-        for key, names in (("torques_N_m", tuple(torques)), ("locked", self.locked)):
-            for name in names:
-                if name not in self.spins:
-                    raise self.error(
-                        f"static_load.{key} = {name!r}: no such rotating body; bodies are {', '.join(self.spins)}"
-                    )
-        if _rank(self._modes_of(self.locked)) < len(self.locked):
-            raise self.error(
-                f"static_load.locked = {list(self.locked)}: more bodies than the degrees of freedom of the train ("
-                f"{self.degrees_of_freedom}), load sharing is undetermined; remove one"
-            )
 
     def _standing(self, body: str) -> tuple[str, ...]:
         """Bodies that are stationary while `body` rotates in a train of several degrees of freedom: the locked ones.

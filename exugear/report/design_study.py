@@ -179,7 +179,11 @@ def study_design_changes(
             results.append(ChangeResult(change, {}, refusal=change.reason))
             continue
         try:
-            gearbox = _changed_gearbox(project, change)
+            gearbox = project.gearbox.varied(change.keys)
+            # Check the changed gearbox as a file would be.
+            check_parts(gearbox)
+            if reason := lacking(gearbox, project.choice.variant):
+                raise gearbox.error(reason)
             after = {load: peaks(_at_load(project, gearbox, change.name, load).steady(settings)) for load in points}
             effects = least_favourable([effects_of(before[load], after[load]) for load in points])
             costs = [price_of(project.gearbox, gearbox, nominal=rated is None)]
@@ -282,15 +286,6 @@ def relief_tolerance(project: ComputedProject, change: DesignChange) -> str:
                 f"relief {less} µm, with {TOLERANCE_UM:g} µm more {more} µm"
             )
     return "; ".join(texts)
-
-
-def _changed_gearbox(project: ComputedProject, change: DesignChange) -> Gearbox:
-    """Check the changed gearbox as a file would be."""
-    gearbox = project.gearbox.varied(change.keys)
-    check_parts(gearbox)
-    if reason := lacking(gearbox, project.choice.variant):
-        raise gearbox.error(reason)
-    return gearbox
 
 
 def at_load(gearbox: Gearbox, load: str) -> Gearbox:

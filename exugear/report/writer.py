@@ -30,12 +30,12 @@ from exugear.report.findings.other_design import read_other_design
 from exugear.report.findings.parameter_variations import begin_variations, model_variations
 from exugear.report.findings.ratings import ratings_of
 from exugear.report.findings.resonance_list import resonance_list
-from exugear.report.findings.words import Labels
+from exugear.report.findings.words import Labels, capitalised
 from exugear.report.sections.answer import answer_section
 from exugear.report.sections.bearings import bearings_section
 from exugear.report.sections.changes import changes_section, stored_study
 from exugear.report.sections.gears import gears_section
-from exugear.report.sections.material import Part, ReportData, lines_of
+from exugear.report.sections.material import Part, ReportData
 from exugear.report.sections.model import model_section
 from exugear.report.sections.resonances import resonances_section
 from exugear.report.sections.run_data import run_data
@@ -43,6 +43,7 @@ from exugear.report.web.document import ArrayStore, whole_page
 from exugear.report.web.html import render
 from exugear.results.findings import Finding
 from exugear.results.folder import REPORT_FILE, read_stored_gearbox
+from exugear.results.spectra.waterfall import order_lines
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.files import write_file
 
@@ -79,17 +80,6 @@ def command_line(gearbox: Gearbox, folder: Path, verb: str, model: Choice) -> st
     if verb == "steady" and LAWS[model.mesh_model].loses_contact:
         words += ["--method", "nonlinear"]
     return shlex.join([*words, "--out", shown_path(folder)])
-
-
-def _scope(material: ReportData) -> str:
-    gearbox = material.context.gearbox
-    rated = gearbox.case.operation.rated_speed_rpm
-    parts = [] if rated is None else [f"rated {rated:g} rpm"]
-    parts += [material.words.labelled(static_load_in_words(gearbox)), gearbox.train.ratio_text]
-    if material.headline is not None:
-        parts += [Variant.of(material.headline.choice.variant).label, material.headline.source]
-    text = ", ".join(parts)
-    return f"{text[0].upper()}{text[1:]}."
 
 
 # The report of a results folder as a self-contained web page
@@ -170,19 +160,29 @@ def write_report(
     if compare is not None:
         material = replace(material, other_design=read_other_design(context, material.headline, compare))
     parts = [section(material) for section in SECTIONS]
+    scope = [] if material.rated_rpm is None else [f"rated {material.rated_rpm:g} rpm"]
+    scope += [material.words.labelled(static_load_in_words(gearbox)), gearbox.train.ratio_text]
+    if material.headline is not None:
+        scope += [Variant.of(material.headline.choice.variant).label, material.headline.source]
     # The body is made last, because sections add notes that its head shows.
     body = render(
         "report",
         name=gearbox.name,
-        scope=_scope(material),
+        scope=f"{capitalised(', '.join(scope))}.",
         parts=[part for part in parts if part.html],
         notes=context.notes,
         steady=material.headline is not None and material.headline.response is not None,
         source=material.file_words,
     )
-    rated = gearbox.case.operation.rated_speed_rpm
-    head: dict[str, Any] = {"name": gearbox.name, "input": material.input_words, "rated": rated}
-    data = {**head, "lines": [], "groups": [], "models": {}, "charts": material.charts}
+    data: dict[str, Any] = {
+        "name": gearbox.name,
+        "input": material.input_words,
+        "rated": material.rated_rpm,
+        "lines": [],
+        "groups": [],
+        "models": {},
+        "charts": material.charts,
+    }
     for part in parts:
         data |= part.data
     title = f"{gearbox.name}: resonance report"
@@ -190,17 +190,15 @@ def write_report(
     page = whole_page(title, body, "report", data, material.arrays, LIBRARIES)
     write_file(path, page.encode("utf-8", "replace"))
     ranked = () if material.headline is None else material.headline.ranking.resonances
-    resonances = tuple(resonance.summary() for resonance in ranked)
-    notes = context.notes
     return Report(
         path,
-        tuple(notes.statements),
-        resonances,
+        tuple(context.notes.statements),
+        tuple(resonance.summary() for resonance in ranked),
         material.missing,
-        tuple(notes.left_out),
+        tuple(context.notes.left_out),
         gearbox,
         material.headline,
-        tuple(notes.findings),
+        tuple(context.notes.findings),
         material.design_study,
     )
 
@@ -216,9 +214,10 @@ def _material(context: Context, executor: Executor | None) -> ReportData:
         raise ReportError("\n".join([f"{context.folder}: no results of this gearbox file", *reasons]))
     groups = groups_of(context, results)
     words = Labels(context.gearbox)
+    lines = order_lines(context.gearbox)
     headline = headline_of(context, results, groups)
     lists = {(group.name, variant): resonance_list(group, variant) for group in groups for variant in group.runs}
-    material = ReportData(context, results, words, groups, (), lines_of(context), headline, ArrayStore(), lists)
+    material = ReportData(context, results, words, groups, (), lines, headline, ArrayStore(), lists)
     # Variations come last; another process may compute them in the meantime.
     drawn = run_data(material)
     return replace(

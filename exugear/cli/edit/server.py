@@ -191,30 +191,25 @@ class Handler(BaseHTTPRequestHandler):
                     self.wfile.flush()
         elif path == "save":
             try:
-                self.server.file.save(str(content.get("text", "")), str(content.get("digest", "")))
+                server.file.save(str(content.get("text", "")), str(content.get("digest", "")))
             except OSError as error:
-                reason = f"{error.filename or self.server.file.case}: {error.strerror or error}"
+                reason = f"{error.filename or server.file.case}: {error.strerror or error}"
                 raise RefusedError(
                     HTTPStatus.INTERNAL_SERVER_ERROR,
                     f"The file was not saved and has its earlier content ({reason}). The text is still in this page.",
                 ) from error
             self._send_json(server.file.told())
         elif path == "start" and content.get("kind") in KINDS:
-            self._start(str(content["kind"]))
+            text = server.file.text()
+            if server.analyst.check(text).gearbox is None:
+                raise RefusedError(HTTPStatus.CONFLICT, "the saved file has errors; correct them and save it first")
+            server.work.start(str(content["kind"]), digest_of(text))
             self._send_json({"work": server.work.told()})
         elif path == "cancel":
             server.work.cancel()
             self._send_json({"work": server.work.told()})
         else:
             raise RefusedError(HTTPStatus.NOT_FOUND, "no such page")
-
-    def _start(self, kind: str) -> None:
-        server = self.server
-        text = server.file.text()
-        gearbox = server.analyst.check(text).gearbox
-        if gearbox is None:
-            raise RefusedError(HTTPStatus.CONFLICT, "the saved file has errors; correct them and save it first")
-        server.work.start(kind, digest_of(text))
 
     def _content(self) -> dict[str, Any]:
         if self.headers.get_content_type() != "application/json":  # a form of another page cannot send it

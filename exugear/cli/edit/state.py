@@ -24,7 +24,7 @@ from exugear.cli.tasks import check as check_task
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import operating_range
 from exugear.gearbox.named_files import NOTHING_MORE, Permissions
-from exugear.gearbox.reading import GearboxFileError, parsed_toml
+from exugear.gearbox.reading import GearboxFileError, parsed_toml, plain_lines
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.words import Labels
@@ -159,8 +159,16 @@ class Analyst:
             yield {"step": "dynamics", "failed": True, "remarks": [asdict(remark) for remark in errors]}
 
     def _pictured(self, bodies: tuple[DrawnBody, ...], labels: Mapping[str, str]) -> dict[str, Any]:
-        """Return the step ``picture``; most changes of a text leave it as it was."""
-        geometry = _digest(bodies, labels)
+        """Return the step ``picture``; most changes of a text leave it as it was.
+
+        The digest of the shapes and labels is the name of the geometry.
+        """
+        digest = hashlib.sha256(repr(sorted(labels.items())).encode())
+        for body in bodies:
+            digest.update(f"{body.shape.name} {body.owner} {body.colour} {body.shape.fixed}".encode())
+            for values in (body.shape.surface.points, body.shape.surface.triangles, body.shape.reference):
+                digest.update(np.ascontiguousarray(values).tobytes())
+        geometry = digest.hexdigest()[:16]
         if self._picture["geometry"] != geometry:
             arrays = ArrayStore(f"{geometry}-", level=1)
             stage = bodies_data(bodies, labels, arrays)
@@ -175,8 +183,7 @@ class Analyst:
         """Read and check a text."""
         content = None
         try:
-            plain = text.replace("\r\n", "\n").replace("\r", "\n")
-            content = parsed_toml(plain, self._source)
+            content = parsed_toml(plain_lines(text), self._source)
             gearbox = checked_gearbox(content, self._source, self._permissions)
             # Errors of loads and of the train are found only when these are used.
             with model_errors():
@@ -223,7 +230,7 @@ def kinematics(gearbox: Gearbox) -> dict[str, Any]:
             "body": name,
             "speed_rpm": spin / RPM,
             "ratio": spin / (speed * RPM),
-            "key": f"bodies.{_family(gearbox, name)}",
+            "key": f"bodies.{gearbox.named_bodies[name].family}",
         }
         for name, spin in spins.items()
     ]
@@ -244,11 +251,6 @@ def kinematics(gearbox: Gearbox) -> dict[str, Any]:
         "speeds": table_data(SPEEDS, speeds, legend=legend),
         "frequencies": table_data(FREQUENCIES, meshes[::-1], legend=legend),
     }
-
-
-def _family(gearbox: Gearbox, name: str) -> str:
-    body = gearbox.named_bodies.get(name)
-    return name if body is None else body.family
 
 
 def dynamics(modes: Modes) -> dict[str, Any]:
@@ -338,16 +340,6 @@ def motions(modes: Modes, bodies: tuple[DrawnBody, ...]) -> dict[str, Any]:
     arrays = ArrayStore(f"{shapes}-", level=1)
     stage = motions_data(modes.assembly, tuple(map(_thinned, bodies)), modes.shapes, arrays)
     return {"stage": stage, "arrays": arrays.packed()}
-
-
-def _digest(bodies: Iterable[DrawnBody], labels: Mapping[str, str]) -> str:
-    """Return a name for the shapes of bodies."""
-    digest = hashlib.sha256(repr(sorted(labels.items())).encode())
-    for body in bodies:
-        digest.update(f"{body.shape.name} {body.owner} {body.colour} {body.shape.fixed}".encode())
-        for values in (body.shape.surface.points, body.shape.surface.triangles, body.shape.reference):
-            digest.update(np.ascontiguousarray(values).tobytes())
-    return digest.hexdigest()[:16]
 
 
 def _thinned(body: DrawnBody) -> DrawnBody:

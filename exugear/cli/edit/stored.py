@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from exugear.gearbox.named_files import LARGEST_CASE, LARGEST_MATRICES, NamedFileError, check_regular
-from exugear.gearbox.reading import GearboxFileError, read_text
+from exugear.gearbox.reading import GearboxFileError, plain_lines, read_text
 from exugear.results.folder import REPORT_FILE, content_digest, times_spent
 from fe_ste.tools.files import write_file
 
@@ -51,7 +51,7 @@ class EditedFile:
     def text(self) -> str:
         """Read the file with line ends of the page; empty if it is empty or cannot be read."""
         try:
-            return read_text(self.case).replace("\r\n", "\n").replace("\r", "\n")
+            return plain_lines(read_text(self.case))
         except GearboxFileError:
             return ""
 

@@ -64,11 +64,7 @@ def bearings(project: WatchedProject, as_json: bool, whole: bool) -> None:
 
 def _rating(key: str, bearing: Mapping[str, Any]) -> str:
     """Rating of a bearing, marked if it is estimated or of manufacturers."""
-    sign = ""
-    if bearing["ratings_estimated"]:
-        sign = "*"
-    elif bearing["ratings_of_makers"]:
-        sign = "+"
+    sign = "*" if bearing["ratings_estimated"] else "+" if bearing["ratings_of_makers"] else ""
     return significant(bearing[key], 3) + sign
 
 

@@ -6,6 +6,7 @@ import io
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -31,6 +32,9 @@ from exugear.system.bodies.matrix_files.interface import UnitSystemName
 from exugear.system.bodies.of_gearbox import node_numbers
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.files import FileError, write_file
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 FOLDER = "matrices"
 """Folder of the files in a results folder."""
@@ -127,10 +131,7 @@ def export_loads(
     names = [f"{stem}.csv", *([] if speed is None else [f"{stem}.bdf"])]
     _refuse_existing(folder, names)
     gearbox = read_gearbox(case, allow_dir, tell=not as_json)
-    try:
-        data = load_response(response)
-    except FileError as error:
-        raise BadInputError(f"--loads {error}; specify a file that exugear steady has written") from error
+    data = _response("--loads", response)
     speeds = data["speed"].to_numpy()
     points = range(len(speeds)) if speed is None else [_nearest(speeds, speed)]
     is_flexible = choice_of(data.attrs).variant == Variant.flexible
@@ -175,10 +176,7 @@ def export_surface(
     folder = to or response.parent
     names = [f"{response.stem}-surface.{ending}" for ending in ("nc", "vtu")]
     _refuse_existing(folder, names)
-    try:
-        data = load_response(response)
-    except FileError as error:
-        raise BadInputError(f"--surface {error}; specify a file that exugear steady has written") from error
+    data = _response("--surface", response)
     choice = choice_of(data.attrs)
     point = _nearest(data["speed"].to_numpy(), speed)
     variant = Variant.of(choice.variant)
@@ -222,6 +220,14 @@ def export_surface(
         },
         path=folder / names[-1],
     ).show(as_json, whole)
+
+
+def _response(option: str, path: Path) -> xr.Dataset:
+    """Read the steady-state response that an option names."""
+    try:
+        return load_response(path)
+    except FileError as error:
+        raise BadInputError(f"{option} {error}; specify a file that exugear steady has written") from error
 
 
 def write_together(folder: Path, contents: Mapping[str, bytes]) -> None:

@@ -69,14 +69,6 @@ def _source_columns(unit: str, factor: float) -> tuple[Column, ...]:
     )
 
 
-def _equivalent_columns(unit: str, factor: float) -> tuple[Column, ...]:
-    return (
-        Column("S-N exponent", "exponent"),
-        Column(f"torque\n{unit}", "torque", _three, factor, missing=""),
-        Column(f"torque range\n{unit}", "range", _three, factor, missing=""),
-    )
-
-
 PARTS = (
     Column("part", "part"),
     Column("mesh", "loaded_by", missing="", is_text=True),
@@ -99,11 +91,15 @@ def load_tables(summary: Mapping[str, Any], bins: int) -> list[Table]:
         for name, by_exponent in summary["hub_equivalent_range_1_Hz"].items()
     ]
     columns = [Column("load", "load"), *(Column(m, m, _three) for m in (hub[0] if hub else ()) if m != "load")]
+    unit, factor = _torque_unit(summary)
+    equivalents = [
+        Column("S-N exponent", "exponent"),
+        Column(f"torque\n{unit}", "torque", _three, factor, missing=""),
+        Column(f"torque range\n{unit}", "range", _three, factor, missing=""),
+    ]
     return [
-        Table("Load sources", summary["sources"], _source_columns(*_torque_unit(summary)), noun="sources"),
-        Table(
-            f"Damage-equivalent loads {years}", [*torques, *ranges], _equivalent_columns(*_torque_unit(summary)), legend
-        ),
+        Table("Load sources", summary["sources"], _source_columns(unit, factor), noun="sources"),
+        Table(f"Damage-equivalent loads {years}", [*torques, *ranges], equivalents, legend),
         Table(f"Damage-equivalent rotor loads {years}", hub, columns, HUB_LEGEND),
         Table("Loads on rotating parts", summary["parts"], PARTS, "Mesh force: per mesh, at the largest torque."),
     ]

@@ -76,17 +76,23 @@ def measured(
             failure = f"--write: nothing is written; {error}"
     path = at_load.measured_path(run_up.name)
     summary = {"case": project.gearbox.source, "variant": str(project.choice.variant), **comparison.summary()}
+    if summary["foreign_orders"]:
+        orders = ", ".join(f"{own['order']:.4g}" for own in summary["foreign_orders"][:5])
+        lines.insert(0, f"Orders of no shaft or mesh: {orders}")
+    fit_notes = []
+    if fit is not None:
+        text = f"fit: {fit.before:.2f} to {fit.after:.2f} dB (rms) without the mean of each channel, {fit.series} "
+        text += "orders of channels; all other values are those of the file, such as inertias: "
+        text += "errors of them shift the fit"
+        fit_notes.append(Finding("note", text))
     Outcome(
         verdict=comparison.verdict,
-        further=[
-            *([_foreign(summary)] if summary["foreign_orders"] else []),
-            *lines,
-        ],
+        further=lines,
         summary={**summary, **({"fit": fitted_parameters(fit)} if fit else {}), "file": str(path)},
         tables=measured_tables(summary),
         findings=[
             *comparison.findings,
-            *_undetermined(fit),
+            *fit_notes,
             Finding(
                 "note",
                 "not noticeable: peak for rms (3 dB), an amplifier that clips before its anti-aliasing filter; an "
@@ -96,12 +102,6 @@ def measured(
         path=f"{path}, CSV tables, {path.with_suffix('.png').name}",
         failure=failure,
     ).show(as_json, whole)
-
-
-def _foreign(summary: Mapping[str, Any]) -> str:
-    """Return the orders that belong to nothing of the gearbox, in one line."""
-    orders = ", ".join(f"{own['order']:.4g}" for own in summary["foreign_orders"][:5])
-    return f"Orders of no shaft or mesh: {orders}"
 
 
 def fitted_parameters(fit: ParameterFit) -> dict[str, Any]:
@@ -118,21 +118,6 @@ def fitted_parameters(fit: ParameterFit) -> dict[str, Any]:
             for own in fit.parameters
         ],
     }  # fmt: skip
-
-
-def _undetermined(fit: ParameterFit | None) -> list[Finding]:
-    """Return what a fit says, and what it assumes."""
-    if fit is None:
-        return []
-    text = (
-        f"fit: {fit.before:.2f} to {fit.after:.2f} dB (rms) without the mean of each channel, {fit.series} orders of "
-        "channels"
-    )
-    return [
-        Finding(
-            "note", f"{text}; all other values are those of the file, such as inertias: errors of them shift the fit"
-        )
-    ]
 
 
 def _amplitude(key: str) -> Any:

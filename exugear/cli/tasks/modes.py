@@ -112,15 +112,13 @@ def mode_table(summary: Mapping[str, Any], whole: bool) -> Table:
 
     Damping and TE participation are omitted for rigid-body modes.
     """
-    rows = summary["modes"]
-    if not whole:
-        rows = sorted(rows, key=lambda mode: -mode["te_participation"])
-    title = "Modes by {}: {variant}, {mesh_model}, {inertias}"
+    by = "frequency" if whole else "TE participation"
+    rows = summary["modes"] if whole else sorted(summary["modes"], key=lambda mode: -mode["te_participation"])
     most = None if whole else 1
     columns = [
         *COLUMNS,
         Column("kinetic energy\n%", _energy(0, most), is_text=True),
         Column("strain energy\n%", _energy(2, most), is_text=True),
     ]
-    title = title.format("frequency" if whole else "TE participation", **summary)
+    title = f"Modes by {by}: {summary['variant']}, {summary['mesh_model']}, {summary['inertias']}"
     return Table(title, rows, columns, LEGEND, noun="modes")

@@ -8,14 +8,7 @@ from operator import attrgetter
 from pathlib import Path
 
 from exugear.cli.case import check_allow_dir
-from exugear.cli.console import (
-    BadInputError,
-    FailedError,
-    interruption,
-    model_errors,
-    note,
-    progress_bar,
-)
+from exugear.cli.console import BadInputError, FailedError, interruption, model_errors, note, progress_bar
 from exugear.cli.resonances import highest_resonance, resonance_table
 from exugear.cli.tables import Column, Outcome, Table
 from exugear.cli.watched import WatchedProject
@@ -71,25 +64,21 @@ def report(
         raise BadInputError(f"{folder}: no such folder; specify the results folder of exugear run")
     if not changes.levers and (changes.resonance is not None or changes.loads):
         raise BadInputError("--resonance and --load are for design changes: add --levers")
+    permissions = Permissions(below=allow_dir)
     for load in changes.loads:  # before long work
-        at_load(read_stored_gearbox(folder, Permissions(below=allow_dir)), load)
+        at_load(read_stored_gearbox(folder, permissions), load)
     other = None if compare is None else _results_of(compare)
     if other is not None and not other.is_dir():
         raise BadInputError(f"{other}: --compare: no such folder; specify the results folder of another design")
     if other is not None:
         # Another design that cannot be compared is refused before anything is computed.
-        permissions = Permissions(below=allow_dir)
-        own = read_stored_gearbox(folder, permissions)
-        others = read_stored_gearbox(other, permissions)
         try:
-            check_ranges(own, others)
+            check_ranges(read_stored_gearbox(folder, permissions), read_stored_gearbox(other, permissions))
         except ReportError as error:
             raise BadInputError(error) from error
     if not stored:
         _compute_missing(folder, allow_dir)
-    study = None
-    if changes.levers:
-        study = _design_changes(folder, allow_dir, changes)
+    study = _design_changes(folder, allow_dir, changes) if changes.levers else None
     try:
         with (
             time_noted(folder, "report"),

@@ -47,9 +47,12 @@ def run(
 ) -> None:
     """Compute, store and print the run of a project; `command` resumes it."""
     if resume:
-        duration = _duration_to_resume(project, duration)
-    if band is None and resume:
-        band = kept_setting(project.run_directory, "band")
+        if duration is None:
+            duration = kept_setting(project.run_directory, "duration")
+        elif reason := refuse_shorter(project.run_directory, duration):
+            raise BadInputError(f"--duration {duration:g}: {reason}; set a longer duration, or remove --duration")
+        if band is None:
+            band = kept_setting(project.run_directory, "band")
     if band is None:
         band = BAND
     kept = {"band": band, "sample_rate": rate_for(band)}
@@ -82,15 +85,11 @@ def run(
     comparison = None
     if compared is not None and finished.complete:
         with time_noted(project.folder, f"comparison with Exudyn, {choice.variant}"):
-            comparison = _compare(project, compared, kept)
+            try:
+                comparison = project.compare_with_exudyn(compared, **kept)
+            except (RunError, LimitError, FileError) as error:
+                raise FailedError(f"comparison with Exudyn: {error}") from error
     _outcome(project.gearbox.source, finished, comparison, command, said).show(as_json, whole)
-
-
-def _compare(project: Project, duration: float, kept: Mapping[str, float]) -> SolverComparison:
-    try:
-        return project.compare_with_exudyn(duration, **kept)
-    except (RunError, LimitError, FileError) as error:
-        raise FailedError(f"comparison with Exudyn: {error}") from error
 
 
 def load_case_of(project: Project) -> LoadCase:
@@ -136,16 +135,6 @@ def _check_solver(project: Project, solver: str, mesh_route: str) -> None:
             f"--mesh-route loads: user-function loads exist in Exudyn only, not in the solver {solver}; "
             "add --solver exudyn"
         )
-
-
-def _duration_to_resume(project: Project, duration: float | None) -> float | None:
-    """Return the total duration of a resumed run: as specified, else as before; raise an error if it is too short."""
-    directory = project.run_directory
-    if duration is None:
-        return kept_setting(directory, "duration")
-    if reason := refuse_shorter(directory, duration):
-        raise BadInputError(f"--duration {duration:g}: {reason}; set a longer duration, or remove --duration")
-    return duration
 
 
 def _warn_before_run(project: Project, duration: float | None, band: float) -> tuple[str, ...]:

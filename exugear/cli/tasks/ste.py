@@ -11,13 +11,7 @@ from typing import Any
 
 from rich.progress import Progress, TaskID
 
-from exugear.cli.console import (
-    BadInputError,
-    interruption,
-    make_results_folder,
-    note,
-    progress_bar,
-)
+from exugear.cli.console import BadInputError, interruption, make_results_folder, note, progress_bar
 from exugear.cli.tables import Column, Outcome, Table, detail, failure_text, significant
 from exugear.cli.watched import WatchedProject, errors_of_tables
 from exugear.gearbox.choice import Choice

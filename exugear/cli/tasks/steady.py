@@ -137,6 +137,7 @@ def summarise(
     """Summarise a response, with units in the keys."""
     law = LAWS[str(data.attrs["mesh_model"])]
     excited = is_excited(data)
+    sound = sound_over_speed(data) if excited else None  # None without an elastic housing, too
     # planets by their family
     shares = zip(data["mesh_wave"].values, data["left_out"].values, strict=True)
     return {
@@ -187,7 +188,7 @@ def summarise(
             if peak.amplitude > LEAST_AMPLITUDE
         ],
         "sources_of_overall_dte": json.loads(data.attrs["contributions"]) if project.gearbox.varying_loads else [],
-        "sound": _sound(data, ranking) if excited else None,
+        "sound": None if sound is None else sound.inside(ranking.speeds).summary(),
         "file": str(project.steady_path(settings)),
         "neglected_shuttling": [
             {"pair": pair.pair, "load_centroid_m": pair.amplitude, "over_transmission_error": pair.over_error}
@@ -212,12 +213,6 @@ def neglected_shuttling(project: Project) -> tuple[Shuttling, ...]:
     if law.moves_load or not law.needs_tables or project.choice.variant.spins_only:
         return ()
     return shuttling_pairs(project.gearbox, project.folder)
-
-
-def _sound(data: xr.Dataset, ranking: Ranking) -> dict[str, Any] | None:
-    """Return the loudest speed among those that are ranked; None without an elastic housing."""
-    sound = sound_over_speed(data)
-    return None if sound is None else sound.inside(ranking.speeds).summary()
 
 
 def _other_loads(gearbox: Gearbox) -> Iterator[Finding]:

@@ -11,13 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from exugear.cli.case import check_allow_dir, check_choice
-from exugear.cli.console import (
-    BadInputError,
-    FailedError,
-    interruption,
-    make_results_folder,
-    progress_bar,
-)
+from exugear.cli.console import BadInputError, FailedError, interruption, make_results_folder, progress_bar
 from exugear.cli.process import let_in_dask
 from exugear.cli.tables import Column, Outcome, Table, failure_text, significant
 from exugear.gearbox.named_files import Permissions
@@ -73,7 +67,12 @@ def study(
         result = _run(read, folder, opens, shard, merge, retry)
     except (ExecutorError, OptimisationError) as error:
         raise FailedError(error) from error
-    summary = summarise(read, result, _draw(read, folder, result))
+    pictures = []
+    if result.dataset is not None:
+        search = read.file.optimise
+        minimised = () if search is None else tuple(_judged(read)[: len(search.minimise)])
+        pictures = draw_study(result.dataset, folder, minimised)
+    summary = summarise(read, result, pictures)
     finished = f"{summary['finished']} of {summary['points']} points finished"
     Outcome(
         verdict=f"{read.file.name}: {finished}, {summary['computed']} computed now",
@@ -151,16 +150,6 @@ def _run(study: Study, folder: Path, opens: Opens, shard: Shard, merge: bool, re
         if study.file.optimise is not None:
             return optimise(study, folder, opens, progress=show)
         return run_study(study, folder, opens, shard=shard, merge=merge, retry=retry, progress=show)
-
-
-def _draw(study: Study, folder: Path, swept: StudyResult) -> list[Path]:
-    if swept.dataset is None:
-        return []
-    search = study.file.optimise
-    minimised: tuple[str, ...] = ()
-    if search is not None:
-        minimised = tuple(_judged(study)[: len(search.minimise)])
-    return draw_study(swept.dataset, folder, minimised)
 
 
 def summarise(study: Study, swept: StudyResult, pictures: list[Path]) -> dict[str, Any]:

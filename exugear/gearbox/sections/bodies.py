@@ -7,15 +7,17 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from exugear.gearbox.sections import entries as q
-from exugear.gearbox.sections.entries import (
-    MOST_PLANETS,
-    FileName,
-    Name,
-    Point,
-    Section,
-    check_wall,
-)
+from exugear.gearbox.sections.entries import MOST_PLANETS, FileName, Name, Point, Section, check_wall
 from exugear.gearbox.sections.gears import MaterialSection
+
+
+def _check_triangle(axial: float, transverse: float) -> None:
+    """Raise an error for moments of inertia (kg m2) that no rigid body has."""
+    if axial > 2.0 * transverse:
+        raise ValueError(
+            f"axial {axial} kg m2 exceeds twice the transverse {transverse} kg m2: "
+            "no rigid body has such inertias (triangle inequality)"
+        )
 
 
 class InertiaSection(Section):
@@ -32,11 +34,8 @@ class InertiaSection(Section):
 
     @model_validator(mode="after")
     def _triangle(self) -> InertiaSection:
-        if self.transverse_kg_m2 is not None and self.axial_kg_m2 > 2.0 * self.transverse_kg_m2:
-            raise ValueError(
-                f"axial {self.axial_kg_m2} kg m2 exceeds twice the transverse {self.transverse_kg_m2} kg m2: "
-                "no rigid body has such inertias (triangle inequality)"
-            )
+        if self.transverse_kg_m2 is not None:
+            _check_triangle(self.axial_kg_m2, self.transverse_kg_m2)
         return self
 
 
@@ -76,11 +75,7 @@ class BlankSection(Section):
 
     @model_validator(mode="after")
     def _triangle(self) -> BlankSection:
-        if self.axial_kg_m2 > 2.0 * self.transverse_kg_m2:
-            raise ValueError(
-                f"axial {self.axial_kg_m2} kg m2 exceeds twice the transverse {self.transverse_kg_m2} kg m2: "
-                "no rigid body has such inertias (triangle inequality)"
-            )
+        _check_triangle(self.axial_kg_m2, self.transverse_kg_m2)
         return self
 
 

@@ -22,15 +22,7 @@ from exugear.gearbox.sections.connections import (
     MountSection,
     SealSection,
 )
-from exugear.gearbox.sections.entries import (
-    LONGEST_VALUE,
-    MOST_ENTRIES,
-    Entries,
-    FileName,
-    Name,
-    Section,
-    Text,
-)
+from exugear.gearbox.sections.entries import LONGEST_VALUE, MOST_ENTRIES, Entries, FileName, Name, Section, Text
 from exugear.gearbox.sections.excitations import ExcitationSection
 from exugear.gearbox.sections.gears import DeviationSection, GearSection, PairSection, PinSection
 from exugear.gearbox.sections.loads import LoadsSection, LubricantSection, RatingSection

@@ -9,15 +9,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from exugear.gearbox.sections import entries as q
 from exugear.gearbox.sections.designations import boundary_of
-from exugear.gearbox.sections.entries import (
-    GROUND,
-    MOST_PLANETS,
-    Name,
-    Point,
-    Section,
-    Text,
-    check_wall,
-)
+from exugear.gearbox.sections.entries import GROUND, MOST_PLANETS, Name, Point, Section, Text, check_wall
 
 
 class JointSection(Section):
@@ -122,7 +114,7 @@ TYPES_OF_KEYS: dict[str, tuple[frozenset[str], str]] = {
     "inner_groove_ratio": (_BALLS, "roller raceways have no groove"),
     "outer_groove_ratio": (
         _BALLS - _SELF_ALIGNING,
-        ("only ball bearings have grooves, and self-aligning ones have a sphere"),
+        "only ball bearings have grooves, and self-aligning ones have a sphere",
     ),
     "osculation": (_BARRELS, "only for barrel rollers"),
     "profile": (_PROFILED, "not for ball bearings; for barrel rollers it follows from the osculation"),

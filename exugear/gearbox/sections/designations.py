@@ -137,20 +137,25 @@ def boundary_of(designation: str) -> Boundary | None:
     text = re.sub(r"^([A-Z]+)\s+(?=\d)", r"\1", designation.strip().upper())
     tapered = re.match(r"(30[23]|32[023]|330)(\d\d)(?!\d)", text)
     if tapered:
-        return _found("tapered_roller", tapered[2], tapered[1][-1], _TAPERED[tapered[1]])
+        return _found("tapered_roller", _bore(tapered[2]), tapered[1][-1], _TAPERED[tapered[1]])
     for start, kind, series in _FAMILIES:
         match = re.match(rf"{start}(\d\d)(?!\d)", text)
         if match:
             dimensions = series.get(match[1], match[1])
-            if _BORES.get(match[2], 5 * int(match[2])) < _LEAST_BORE.get(kind, {}).get(dimensions, 0):
+            bore = _bore(match[2])
+            if bore < _LEAST_BORE.get(kind, {}).get(dimensions, 0):
                 return None
-            return _found(kind, match[2], dimensions[-1], _WIDTH[dimensions])
+            return _found(kind, bore, dimensions[-1], _WIDTH[dimensions])
     return None
 
 
-def _found(kind: str, number: str, diameter_series: str, widths: Mapping[int, float]) -> Boundary | None:
-    bore = _BORES.get(number, 5 * int(number))
-    outer = _OUTER["0" if diameter_series == "0" else diameter_series].get(bore)
+def _bore(number: str) -> int:
+    """Return the bore (mm) of a bore number."""
+    return _BORES.get(number, 5 * int(number))
+
+
+def _found(kind: str, bore: int, diameter_series: str, widths: Mapping[int, float]) -> Boundary | None:
+    outer = _OUTER[diameter_series].get(bore)
     if outer is None or bore not in widths:
         return None
     return Boundary(kind, float(bore), outer, widths[bore], SOURCES.get(kind, SOURCES[""]))

@@ -205,8 +205,7 @@ OffsetUm = Annotated[float, _symmetric_range(5000.0, 1000.0)]
 def unusual_values(model: BaseModel) -> Iterator[tuple[str, float, str]]:
     """Yield key, value and warning of each unusual value of a model."""
     for key, value, limits in quantities(model):
-        warning = limits.warning(value)
-        if warning:
+        if warning := limits.warning(value):
             yield key, value, warning
 
 

@@ -111,8 +111,8 @@ def read_ripple_table(path: Path) -> RippleTable:
     values = np.array([_numbers(number, row, len(names)) for number, row in lines])
     columns = dict(zip(names, values.T, strict=True))
     for name, column in columns.items():
-        bad = np.flatnonzero((column < 0.0) if name in ("speed_rpm", "amplitude_N_m") else np.zeros(1, dtype=bool))
-        if bad.size:
+        bad = np.flatnonzero(column < 0.0)
+        if bad.size and name in ("speed_rpm", "amplitude_N_m"):
             raise TableError(f"line {lines[bad[0]][0]}: {name} = {column[bad[0]]:g} must not be negative")
     orders = columns["order"]
     bad = np.flatnonzero((orders <= 0.0) | (2.0 * orders != np.round(2.0 * orders)) | (orders > 2000.0))

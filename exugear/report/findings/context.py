@@ -132,6 +132,10 @@ class Context:
         """Return the path of a file relative to the results folder."""
         return path.relative_to(self.folder)
 
+    def leave_out(self, path: Path, reason: object) -> None:
+        """Note that a file of the results folder is skipped, and why."""
+        self.notes.left_out.append(f"{self.name_of(path)}: {reason}")
+
 
 # Results in the folder that belong to its gearbox file: tables, modes and runs
 
@@ -169,7 +173,16 @@ def stored_models(context: Context) -> StoredResults:
             tables[name] = fitting_table(context.gearbox, name, context.folder)
         except TableError as error:
             context.notes.left_out.append(f"table of {name}: {error}")
-    return StoredResults(tables, dict(_stored_modes(context)), ())
+    modes = {}
+    for path in sorted(context.folder.glob("*/*/modes.nc")):
+        try:
+            data = load_modes(path)
+        except FileError as error:
+            context.notes.left_out.append(str(error))
+            continue
+        if _fits(context, path, data.attrs):
+            modes[choice_of(data.attrs)] = data
+    return StoredResults(tables, modes, ())
 
 
 def with_responses(context: Context, models: StoredResults) -> StoredResults:
@@ -188,12 +201,12 @@ def _stored_steady(context: Context) -> Iterator[xr.Dataset]:
             context.notes.left_out.append(str(error))
             continue
         except (*_UNFIT, ValueError) as error:
-            context.notes.left_out.append(f"{context.name_of(path)}: {error}")
+            context.leave_out(path, error)
             continue
         if fits:
             yield data
         else:
-            context.notes.left_out.append(f"{context.name_of(path)}: {OTHER_INPUT}")
+            context.leave_out(path, OTHER_INPUT)
 
 
 def _stored_measured(context: Context) -> Iterator[xr.Dataset]:
@@ -211,23 +224,19 @@ def _stored_measured(context: Context) -> Iterator[xr.Dataset]:
                 context.notes.left_out.append(str(error))
                 continue
             except (*_UNFIT, ValueError) as error:
-                context.notes.left_out.append(f"{context.name_of(path)}: {error}")
+                context.leave_out(path, error)
                 continue
             own = data.attrs
             if comparison_hash(str(own["recording_sha256"]), section, found) != own["input_hash"]:
-                context.notes.left_out.append(f"{context.name_of(path)}: {OTHER_INPUT}")
+                context.leave_out(path, OTHER_INPUT)
             elif _is_replaced(context.gearbox, name, str(own["recording_sha256"])):
-                context.notes.left_out.append(
-                    f"{context.name_of(path)}: its recording {section.file} was replaced; run exugear measured again"
-                )
+                context.leave_out(path, f"its recording {section.file} was replaced; run exugear measured again")
             else:
                 yield data.assign_attrs({key: response.attrs[key] for key in ("variant", "mesh_model", "inertias")})
         at_loads = (context.folder.glob(f"{depth}/*/*/measured-{name}.nc") for depth in ("at-*", "at-*/at-*"))
         for path in sorted(chain(*at_loads)):
             folder = path.parents[2]
-            context.notes.left_out.append(
-                f"{context.name_of(path)}: is at another load; exugear report {shown_path(folder)} shows it"
-            )
+            context.leave_out(path, f"is at another load; exugear report {shown_path(folder)} shows it")
 
 
 def _is_replaced(gearbox: Gearbox, name: str, digest: str) -> bool:
@@ -241,17 +250,6 @@ def _is_replaced(gearbox: Gearbox, name: str, digest: str) -> bool:
         return file_digest(recording_path(gearbox, name)) != digest
     except (GearboxFileError, FileError):
         return False
-
-
-def _stored_modes(context: Context) -> Iterator[tuple[Choice, xr.Dataset]]:
-    for path in sorted(context.folder.glob("*/*/modes.nc")):
-        try:
-            data = load_modes(path)
-        except FileError as error:
-            context.notes.left_out.append(str(error))
-            continue
-        if _fits(context, path, data.attrs):
-            yield choice_of(data.attrs), data
 
 
 def _stored_runs(context: Context, modes: Mapping[Choice, xr.Dataset]) -> Iterator[VariantRun]:
@@ -269,7 +267,7 @@ def _stored_runs(context: Context, modes: Mapping[Choice, xr.Dataset]) -> Iterat
             try:
                 yield analysed(signals, lines, modes.get(choice_of(signals.attributes)), longest)
             except ValueError as error:
-                context.notes.left_out.append(f"{context.name_of(signals.path)}: {error}")
+                context.leave_out(signals.path, error)
 
 
 def _fitting_signals(context: Context, path: Path) -> tuple[RunSignals, float] | None:
@@ -288,7 +286,7 @@ def _fitting_signals(context: Context, path: Path) -> tuple[RunSignals, float] |
     except FileError as error:
         context.notes.left_out.append(str(error))
     except ValueError as error:
-        context.notes.left_out.append(f"{context.name_of(path)}: {error}")
+        context.leave_out(path, error)
     return None
 
 
@@ -312,10 +310,9 @@ def _fits(context: Context, path: Path, attributes: Mapping[str, Any]) -> bool:
             raise GearboxFileError(f"the gearbox file has no load case {load_case!r}")
         if input_hash(context.assembled(choice_of(attributes)), load_case) == attributes.get("input_hash"):
             return True
-        reason = OTHER_INPUT
+        context.leave_out(path, OTHER_INPUT)
     except _UNFIT as error:
-        reason = str(error)
-    context.notes.left_out.append(f"{context.name_of(path)}: {reason}")
+        context.leave_out(path, error)
     return False
 
 

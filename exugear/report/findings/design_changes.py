@@ -17,7 +17,7 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -171,7 +171,14 @@ def read_design_study(path: Path) -> DesignStudy:
     """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-        results = [_result_from(one) for one in content.pop("results")]
+        results = []
+        for one in content.pop("results"):
+            effects = {str(name): Effect(*map(_number, effect.values())) for name, effect in one["effects"].items()}
+            change = DesignChange(**one["change"])
+            if change.group not in GROUPS:
+                raise ValueError(f"no group {change.group!r}")
+            texts = (str(one.get(key, "")) for key in ("price", "objection", "refusal", "remedy"))
+            results.append(ChangeResult(change, effects, *texts))
         study = DesignStudy(**content, results=results)
         if study.quantity not in SIGNALS:
             raise ValueError(f"no quantity {study.quantity!r}")
@@ -180,15 +187,6 @@ def read_design_study(path: Path) -> DesignStudy:
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         raise FileError(f"{path}: cannot be read as design changes ({error}); run exugear report --levers") from None
     return study
-
-
-def _result_from(content: Mapping[str, Any]) -> ChangeResult:
-    effects = {str(name): Effect(*map(_number, effect.values())) for name, effect in content["effects"].items()}
-    change = DesignChange(**content["change"])
-    if change.group not in GROUPS:
-        raise ValueError(f"no group {change.group!r}")
-    texts = (str(content.get(key, "")) for key in ("price", "objection", "refusal", "remedy"))
-    return ChangeResult(change, effects, *texts)
 
 
 def _number(value: float | None) -> float | None:

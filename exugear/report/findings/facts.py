@@ -13,8 +13,8 @@ from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import REFERENCE_VARIANT, Context
 from exugear.report.findings.groups import RankedResonance, RunGroup
 from exugear.report.findings.headline import headline_of_group
-from exugear.report.findings.parameter_variations import BestChange, ModelVariations, best_change
-from exugear.report.findings.words import Labels, figure_text
+from exugear.report.findings.parameter_variations import BestChange, ModelVariations, best_change, variations_of
+from exugear.report.findings.words import Labels, capitalised, figure_text
 from exugear.results.spectra.waterfall import order_lines
 from exugear.steady.peaks import peaks
 
@@ -176,8 +176,7 @@ def _loudest(context: Context, words: Labels, group: RunGroup) -> SummaryCard | 
         with_all = "" if group.responses else " with all window lengths"
         said = f"No resonance found up to {speed_text(highest)}{with_all}."
         return SummaryCard(HIGHEST, "none", "found", said, "ranking")
-    unseen = _unseen(context, words, group, top)
-    if unseen is not None:
+    if unseen := _unseen(context, words, group, top):
         return unseen
     source = ", constant speed" if group.responses else ""
     if not group.responses and top.constant is not None:
@@ -291,7 +290,7 @@ def shift_text(sensitivity: FrequencySensitivity) -> str:
 def _amplitude_reductions(
     words: Labels, group: RunGroup, modes: xr.Dataset, mode: int, variations: Sequence[ModelVariations]
 ) -> tuple[str, ...]:
-    own = next((one.variations for one in variations if one.choice == group.choice(group.main)), ())
+    own = variations_of(variations, group.choice(group.main))
     if not own:
         return ()
     frequency = float(modes["frequency"][mode])
@@ -301,7 +300,7 @@ def _amplitude_reductions(
     best = (best_words(words, max(others, key=lambda change: change.gain)),) if others else ()
     damping = [change for change in changes if change.label.startswith(DAMPING) and change.gain > 0.0]
     changed = ((words.change(change.label, change.value, change.default), change.gain) for change in damping)
-    return best + tuple(f"{text[:1].upper()}{text[1:]}: −{figure_text(gain, 2)} dB." for text, gain in changed)
+    return best + tuple(f"{capitalised(text)}: −{figure_text(gain, 2)} dB." for text, gain in changed)
 
 
 def best_words(words: Labels, best: BestChange) -> str:

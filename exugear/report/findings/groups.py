@@ -32,6 +32,7 @@ from exugear.report.findings.ranking import (
     ConstantSpeed,
     OrderPeak,
     Ranking,
+    Resonance,
     highest_drawn,
     is_over_speed,
     most_complete_levels,
@@ -158,20 +159,12 @@ class RunGroup:
         inside, it is the highest of all.
         """
         picks = own.finding.resonance.picks
-        if leading := next(filter(self.is_leading, picks), None):
+        top = next(iter(self.in_operation.resonances), None)
+        if leading := next((pick for pick in picks if top is not None and is_peak_of(pick, top)), None):
             return leading
         low, high = self.in_operation.speeds
         inside = [pick for pick in picks if low <= abs(pick.speed) <= high]
         return max(inside, key=lambda pick: pick.level, default=own.peak)
-
-    def is_leading(self, peak: Pick) -> bool:
-        """Return whether a peak is that of the first resonance of the ranking."""
-        top = next(iter(self.in_operation.resonances), None)
-        return (
-            top is not None
-            and math.isclose(peak.line.order, top.order, rel_tol=1e-6)
-            and math.isclose(peak.frequency, top.frequency, rel_tol=SAME_FREQUENCY)
-        )
 
     def choice(self, variant: str) -> Choice:
         """Return the model settings of a run."""
@@ -185,6 +178,13 @@ class RunGroup:
             f"{self.source}, {MESH_MODEL_LABELS[self.mesh_model]}, inertia set {self.inertias}, housing stiffness "
             f"factor {', '.join(factors)}"
         )
+
+
+def is_peak_of(peak: Pick, resonance: Resonance) -> bool:
+    """Return whether a peak of the transmission error is that of a ranked resonance: same order, same frequency."""
+    return math.isclose(peak.line.order, resonance.order, rel_tol=1e-6) and math.isclose(
+        peak.frequency, resonance.frequency, rel_tol=SAME_FREQUENCY
+    )
 
 
 def groups_of(context: Context, results: StoredResults) -> tuple[RunGroup, ...]:
@@ -358,9 +358,8 @@ def _named(finding: Finding, data: xr.Dataset) -> Finding:
 def _level_at(spectra: Waterfall, peak: Pick) -> float:
     near = np.abs(peak.line.frequency(spectra.speed) - peak.frequency) <= peak.resolution
     level = spectra.along(peak.line)[near]
-    if np.isfinite(level).any():
-        return float(np.max(level, initial=-np.inf, where=np.isfinite(level)))
-    return float("nan")
+    known = level[np.isfinite(level)]
+    return float(known.max()) if known.size else math.nan
 
 
 # Channels in addition to the overall transmission error: forces of bearings, joints and meshes, from either source
@@ -369,8 +368,6 @@ OVERLAP = 0.5
 """Overlap of successive windows, as a fraction; sufficient for waterfalls coarser than that of the TE."""
 SAMPLED = 8
 """Stride of the samples from which force amplitudes are estimated."""
-MEAN_PART = slice(1, 2)
-"""Third of the run for mean forces: the middle one, without start-up and highest speeds."""
 AXIAL = "z"
 """Axis of the axial force of a bearing."""
 
@@ -500,8 +497,9 @@ def _standing_for(names: Sequence[str], swings: Floats, words: Labels) -> Iterat
 
 
 def _middle(values: Floats) -> Floats:
+    """Return the middle third of a run, without start-up and highest speeds, for mean forces."""
     third = len(values) // 3
-    return values[MEAN_PART.start * third : MEAN_PART.stop * third] if third else values
+    return values[third : 2 * third] if third else values
 
 
 def _waterfall(values: Floats, data: _Signals, run: VariantRun, unit: str = "N") -> Waterfall:

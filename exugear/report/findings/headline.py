@@ -78,23 +78,21 @@ class Headline:
         """Return the mode of a resonance: the nearest to its frequency, or to that where its order crosses a mode."""
         if self.modes is None:
             return None
-        index = self._nearest(resonance)
-        if index is None:
-            return None
-        return MatchedMode(index, float(self.modes["frequency"][index]), float(self.modes["damping_ratio"][index]))
-
-    def _nearest(self, resonance: Resonance) -> int | None:
-        """Return the index of the mode; a run-up has matched its own within its frequency resolution."""
         if self.group is not None and self.response is None:
+            # A run-up has matched its own modes within its frequency resolution.
             found = (own for own in self.group.ranked[self.group.main] if own.peak.line.order == resonance.order)
-            return next((own.finding.mode for own in found if own.speed == resonance.speed), None)
-        assert self.modes is not None
-        crossed = self._crossing(resonance)
-        frequency = resonance.frequency if crossed is None else float(crossed["frequency"])
-        frequencies = self.modes["frequency"].to_numpy()
-        index = int(np.argmin(np.abs(frequencies - frequency)))
-        width = max(SAME_FREQUENCY, float(self.modes["damping_ratio"][index]))
-        return index if abs(frequencies[index] - frequency) <= width * frequency else None
+            index = next((own.finding.mode for own in found if own.speed == resonance.speed), None)
+            if index is None:
+                return None
+        else:
+            crossed = self._crossing(resonance)
+            frequency = resonance.frequency if crossed is None else float(crossed["frequency"])
+            frequencies = self.modes["frequency"].to_numpy()
+            index = int(np.argmin(np.abs(frequencies - frequency)))
+            width = max(SAME_FREQUENCY, float(self.modes["damping_ratio"][index]))
+            if abs(frequencies[index] - frequency) > width * frequency:
+                return None
+        return MatchedMode(index, float(self.modes["frequency"][index]), float(self.modes["damping_ratio"][index]))
 
     def mode_name(self, resonance: Resonance) -> str:
         """Return the description of the mode that a response without a file of modes crosses; empty if unknown."""
@@ -171,10 +169,14 @@ def headline_of_group(group: RunGroup) -> Headline:
 
 def headline_of_response(group: RunGroup, variant: str) -> Headline:
     """Return the ranking of the steady-state response of any variant of a group."""
-    response = group.responses[variant]
-    source = f"constant speed, {METHOD_LABELS[str(response.attrs['method'])]}"
     return Headline(
-        group.choice(variant), source, "", group.rankings[variant], group, response, group.runs[variant].modes
+        group.choice(variant),
+        group.source,
+        "",
+        group.rankings[variant],
+        group,
+        group.responses[variant],
+        group.runs[variant].modes,
     )
 
 

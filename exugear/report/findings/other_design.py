@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ import numpy as np
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import operating_range
 from exugear.gearbox.named_files import Permissions
+from exugear.gearbox.reading import flattened
 from exugear.gearbox.units import RPM
 from exugear.report.findings.context import Context, ReportError, model_label, stored_models, with_responses
 from exugear.report.findings.groups import groups_of
@@ -125,27 +126,10 @@ def check_ranges(own: Gearbox, other: Gearbox) -> None:
 
 def differing_keys(own: Gearbox, other: Gearbox) -> Iterator[Difference]:
     """Yield the keys of two gearbox files that differ and may change results."""
-    first, second = (_flat(gearbox.case.model_dump(mode="json", exclude_defaults=True)) for gearbox in (own, other))
+    first, second = (flattened(gearbox.case.model_dump(mode="json", exclude_defaults=True)) for gearbox in (own, other))
     for key in sorted(first.keys() | second.keys()):
         if first.get(key) != second.get(key) and key.split(".")[0] not in DETAILS:
             yield Difference(key, first.get(key), second.get(key))
-
-
-def _flat(content: Mapping[str, Any], place: str = "") -> dict[str, Any]:
-    """Return all values by dotted key.
-
-    Examples
-    --------
-    >>> _flat({"gears": {"sun": {"teeth": 21}}, "name": "GRC"})
-    {'gears.sun.teeth': 21, 'name': 'GRC'}
-    """
-    found: dict[str, Any] = {}
-    for key, value in content.items():
-        if isinstance(value, Mapping):
-            found |= _flat(value, f"{place}{key}.")
-        else:
-            found[f"{place}{key}"] = value
-    return found
 
 
 def highest_within(curve: Envelope, speeds: tuple[float, float]) -> HighestAmplitude | None:

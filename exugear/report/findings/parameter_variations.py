@@ -96,8 +96,19 @@ def model_variations(
     models = _models_to_vary(context, modes)
     for model in models:
         context.tell(f"variations of {model.variant}, {model.inertias}")
-    known = {} if begun is None else begun.result()
-    return tuple(ModelVariations(model, _variations(context, model, known.get(model, {}))) for model in models)
+    begun_models = {} if begun is None else begun.result()
+    found = []
+    for model in models:
+        known = begun_models.get(model, {})
+        variations = []
+        for parameter in _parameters(context, model):
+            figures = known[parameter.label] if parameter.label in known else _figures(parameter)
+            if isinstance(figures, str):
+                context.notes.left_out.append(f"sensitivity to {parameter.label}: {figures}")
+            else:
+                variations.append(ParameterVariation(parameter, *figures))
+        found.append(ModelVariations(model, tuple(variations)))
+    return tuple(found)
 
 
 def _models_to_vary(context: Context, modes: Mapping[Choice, xr.Dataset]) -> list[Choice]:
@@ -119,15 +130,9 @@ def _figures(parameter: Parameter) -> Figures | str:
     return found.frequency, found.share, found.amplification, found.damping_ratio
 
 
-def _variations(context: Context, model: Choice, known: Mapping[str, Figures | str]) -> tuple[ParameterVariation, ...]:
-    variations = []
-    for parameter in _parameters(context, model):
-        figures = known[parameter.label] if parameter.label in known else _figures(parameter)
-        if isinstance(figures, str):
-            context.notes.left_out.append(f"sensitivity to {parameter.label}: {figures}")
-        else:
-            variations.append(ParameterVariation(parameter, *figures))
-    return tuple(variations)
+def variations_of(variations: Sequence[ModelVariations], choice: Choice) -> tuple[ParameterVariation, ...]:
+    """Return the variations of one model; none if it is not varied."""
+    return next((one.variations for one in variations if one.choice == choice), ())
 
 
 def default_place(variation: ParameterVariation) -> int:

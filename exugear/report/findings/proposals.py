@@ -83,12 +83,17 @@ def propose_changes(
     for name in bearings:
         changes += _bearing_changes(gearbox, name)
     for name in couplings:
-        stiffness = {f"couplings.{name}.stiffness_N_m_per_rad": gearbox.case.couplings[name].stiffness_N_m_per_rad}
-        changes += _scaled(name, "coupling", stiffness)
+        stiffness = gearbox.case.couplings[name].stiffness_N_m_per_rad
+        changes += _scaled(name, "coupling", {f"couplings.{name}.stiffness_N_m_per_rad": stiffness})
     for name in excitations:
         words = f"without the excitation {name}"
         changes.append(DesignChange(f"{name}-none", words, ASSUMPTION, {f"excitations.{name}.enabled": False}))
-    changes += _assumptions(gearbox)
+    # Half and twice the housing factor
+    factor = gearbox.case.housing.factor
+    for other in (0.5 * factor, min(2.0 * factor, 1.0)):
+        if other != factor:
+            words = f"housing stiffness factor {factor:g} to {other:g}"
+            changes.append(DesignChange(f"housing-{other:g}", words, ASSUMPTION, {"housing.factor": other}))
     return changes
 
 
@@ -224,9 +229,20 @@ def _modification_changes(gearbox: Gearbox, name: str, pair: GearPair, deflectio
         yield DesignChange(f"{name}-tip-relief-{amount:g}", words, "modification", relief)
         crowned = sections[both[0]].lead_crowning_um + amount
         words = f"{name}: lead crowning {amount:g} µm more on {both[0]}"
-        key = f"gears.{both[0]}.modification.lead_crowning_um"
-        yield DesignChange(f"{name}-crowning-{amount:g}", words, "modification", {key: crowned})
-    yield from _less(name, sections, amounts)
+        keys = {f"gears.{both[0]}.modification.lead_crowning_um": crowned}
+        yield DesignChange(f"{name}-crowning-{amount:g}", words, "modification", keys)
+    # Less of what the gears have
+    for key, short, label in (
+        ("tip_relief_um", "tip-relief", "tip relief"),
+        ("lead_crowning_um", "crowning", "lead crowning"),
+    ):
+        present = {gear: value for gear, section in sections.items() if (value := getattr(section, key)) > 0.0}
+        for amount in amounts if present else ():
+            keys = {f"gears.{gear}.modification.{key}": max(0.0, value - amount) for gear, value in present.items()}
+            words = f"{name}: {label} {min(amount, max(present.values())):g} µm less on {' and '.join(present)}"
+            yield DesignChange(f"{name}-less-{short}-{amount:g}", words, "modification", keys)
+            if not any(keys.values()):
+                break
 
 
 def alignment_change(gearbox: Gearbox, family: str, opening: float) -> DesignChange | None:
@@ -255,21 +271,6 @@ def alignment_change(gearbox: Gearbox, family: str, opening: float) -> DesignCha
     words = f"{pair}: helix slope {slope:g} µm on {gear}, which closes the gap under the static load"
     keys = {f"gears.{gear}.modification.helix_slope_um": slope}
     return DesignChange(f"{pair}-helix-slope", words, "modification", keys, requirement=PITTING)
-
-
-def _less(name: str, sections: Mapping[str, ModificationSection], amounts: Sequence[float]) -> Iterator[DesignChange]:
-    """Less of the tip relief and of the lead crowning that the gears of a pair have; amounts in µm, ascending."""
-    for key, short, label in (
-        ("tip_relief_um", "tip-relief", "tip relief"),
-        ("lead_crowning_um", "crowning", "lead crowning"),
-    ):
-        present = {gear: value for gear, section in sections.items() if (value := getattr(section, key)) > 0.0}
-        for amount in amounts if present else ():
-            keys = {f"gears.{gear}.modification.{key}": max(0.0, value - amount) for gear, value in present.items()}
-            words = f"{name}: {label} {min(amount, max(present.values())):g} µm less on {' and '.join(present)}"
-            yield DesignChange(f"{name}-less-{short}-{amount:g}", words, "modification", keys)
-            if not any(keys.values()):
-                break
 
 
 def _phasing_changes(gearbox: Gearbox, multiples: Mapping[str, int]) -> Iterator[DesignChange]:
@@ -356,12 +357,3 @@ def _bearing_changes(gearbox: Gearbox, family: str) -> list[DesignChange]:
     kind = "bearing" if catalogue is None else f"{catalogue.type.replace('_', ' ')} bearing"
     reason = f"a {kind} without adjustable contact angle, preload, clearance or stated stiffness"
     return [DesignChange(f"{family}-none", f"{family}: stiffness", "bearing", {}, reason)]
-
-
-def _assumptions(gearbox: Gearbox) -> Iterator[DesignChange]:
-    """Half and twice the housing factor, where the housing is not flexible and the factor is used."""
-    factor = gearbox.case.housing.factor
-    for other in (0.5 * factor, min(2.0 * factor, 1.0)):
-        if other != factor:
-            words = f"housing stiffness factor {factor:g} to {other:g}"
-            yield DesignChange(f"housing-{other:g}", words, ASSUMPTION, {"housing.factor": other})

@@ -272,7 +272,9 @@ def ranking_of(data: xr.Dataset, speeds: tuple[float, float] | None = None, want
         at_speed = float(data["speed"][first_point])
         frequency = order * abs(at_speed) / (2.0 * np.pi)
         found.append(Resonance(names[line], order, at_speed, frequency, amplitudes))
-    return Ranking(tuple(found), (low, high), whole, _accelerating_parts(data), quantity=first, reason=reason)
+    carried = {bool(carrier) for carrier in json.loads(str(data.attrs["carried_seats"])).values()}
+    accelerates = SHAFTS if carried <= {False} else HOUSING if carried == {True} else BOTH
+    return Ranking(tuple(found), (low, high), whole, accelerates, quantity=first, reason=reason)
 
 
 def resonances(data: xr.Dataset, quantity: str | None = None) -> pd.DataFrame:
@@ -289,7 +291,6 @@ def resonances(data: xr.Dataset, quantity: str | None = None) -> pd.DataFrame:
     pandas.DataFrame
         One row a resonance: order, input speed, frequency; amplitude, rank (empty without a peak) and bearing or mount
         of each quantity, and its amplitudes with the lowest and the highest plausible damping. SI units, speeds in rpm.
-
 
     Examples
     --------
@@ -438,16 +439,6 @@ def _is_same_resonance(group: Mapping[str, tuple[int, int, int]], speed: Floats,
     """Return whether a peak belongs to a resonance of the same order: both are at practically the same speed."""
     _, first, _ = next(iter(group.values()))
     return bool(abs(speed[point] - speed[first]) <= SAME_SPEED_TOLERANCE * speed[first])
-
-
-def _accelerating_parts(data: xr.Dataset) -> str:
-    """Return the parts whose accelerations are given, from the seat data of the file."""
-    carried = {bool(carrier) for carrier in json.loads(str(data.attrs["carried_seats"])).values()}
-    if carried <= {False}:
-        return SHAFTS
-    if carried == {True}:
-        return HOUSING
-    return BOTH
 
 
 # Levels at constant speed: a fast run-up underestimates resonances that have no time to build up

@@ -51,7 +51,7 @@ def ratings_of(context: Context) -> Ratings:
     if gearbox.case.loads is not None:
         for stored in stored_lives(gearbox, context.folder, context.assembled):
             if stored.data is None:
-                context.notes.left_out.append(f"{context.name_of(stored.path)}: {stored.reason}")
+                context.leave_out(stored.path, stored.reason)
             else:
                 lives.append(stored.data)
     if gearbox.case.rating is None:

@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from exugear.report.findings.groups import SAME_FREQUENCY, RankedResonance, RunGroup
-from exugear.report.findings.headline import headline_of_response
+from exugear.report.findings.groups import RankedResonance, RunGroup, is_peak_of
+from exugear.report.findings.headline import Headline, headline_of_response
 from exugear.report.findings.ranking import MIN_AMPLITUDE, Resonance, ranking_of
-from exugear.results.spectra.resonances import Pick
 from exugear.results.spectra.waterfall import OrderLine
 from exugear.steady.findings import speed_caveats
 
@@ -43,6 +42,28 @@ class ListedResonance:
     """What weakens its amplitudes."""
 
 
+def listed_resonance(
+    headline: Headline,
+    own: Resonance,
+    inside: bool = True,
+    peak: RankedResonance | None = None,
+    caveats: tuple[str, ...] = (),
+) -> ListedResonance:
+    """Return the entry of a resonance of a ranking, with its mode; see `ListedResonance` for what is added."""
+    found = headline.mode_of(own)
+    return ListedResonance(
+        OrderLine(own.line.replace(" x ", " × "), own.order),
+        abs(own.speed),
+        own.frequency,
+        20.0 * math.log10(max(own.amplitudes["error"].amplitude, MIN_AMPLITUDE) / 1e-6),
+        inside,
+        None if found is None else found.index,
+        own,
+        peak,
+        caveats,
+    )
+
+
 def resonance_list(group: RunGroup, variant: str) -> tuple[ListedResonance, ...]:
     """Return the list of a variant of a result group."""
     listed = _of_response if variant in group.responses else _of_run
@@ -60,36 +81,16 @@ def _of_response(group: RunGroup, variant: str) -> Iterator[ListedResonance]:
     if not ranking.whole:
         speed = caveats.speed
         everywhere = ranking_of(group.responses[variant], (float(speed.min()), float(speed.max())), ranking.wanted)
-        outside = [own for own in everywhere.resonances if not low <= abs(own.speed) <= high][:MOST_OUTSIDE]
-    for own in (*inside, *map(_without_ranks, outside)):
-        found = headline.mode_of(own)
-        yield ListedResonance(
-            OrderLine(own.line.replace(" x ", " × "), own.order),
-            abs(own.speed),
-            own.frequency,
-            20.0 * math.log10(max(own.amplitudes["error"].amplitude, MIN_AMPLITUDE) / 1e-6),
-            own in inside,
-            None if found is None else found.index,
-            own,
-            _peak_of(group.ranked[variant], own),
-            caveats.at(own.speed),
-        )
-
-
-def _without_ranks(own: Resonance) -> Resonance:
-    """Return a resonance outside the range: ranks count within it."""
-    return replace(own, amplitudes={name: replace(one, place=None) for name, one in own.amplitudes.items()})
-
-
-def _peak_of(ranked: Sequence[RankedResonance], own: Resonance) -> RankedResonance | None:
-    """Return the resonance of the transmission error with a peak of the same order at the same frequency."""
-
-    def is_same(pick: Pick) -> bool:
-        return math.isclose(pick.line.order, own.order, rel_tol=1e-6) and math.isclose(
-            pick.frequency, own.frequency, rel_tol=SAME_FREQUENCY
-        )
-
-    return next((one for one in ranked if any(map(is_same, one.finding.resonance.picks))), None)
+        # Ranks count within the range.
+        outside = [
+            replace(own, amplitudes={name: replace(one, place=None) for name, one in own.amplitudes.items()})
+            for own in everywhere.resonances
+            if not low <= abs(own.speed) <= high
+        ][:MOST_OUTSIDE]
+    for own in (*inside, *outside):
+        picked = (one for one in group.ranked[variant] if any(is_peak_of(p, own) for p in one.finding.resonance.picks))
+        peak = next(picked, None)
+        yield listed_resonance(headline, own, own in inside, peak, caveats.at(own.speed))
 
 
 def _of_run(group: RunGroup, variant: str) -> Iterator[ListedResonance]:

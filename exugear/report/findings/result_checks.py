@@ -58,17 +58,12 @@ def validity_checks(context: Context, group: RunGroup) -> tuple[Finding, ...]:
     else:
         verdicts = [*response_findings(response)]
     verdicts += _check_resonances(group)
-    verdicts.append(
-        Finding(
-            "warning",
-            (f"damping is assumed ({damping_in_words(case.damping)}). Resonance amplitudes depend on it directly"),
-        )
-    )
+    text = f"damping is assumed ({damping_in_words(case.damping)}). Resonance amplitudes depend on it directly"
+    verdicts.append(Finding("warning", text))
     sets = context.gearbox.inertia_sets
     if len(sets) > 1:
-        verdicts.append(
-            Finding("warning", (f"one of {len(sets)} inertia sets ({', '.join(sets)}) is used; compare the others"))
-        )
+        text = f"one of {len(sets)} inertia sets ({', '.join(sets)}) is used; compare the others"
+        verdicts.append(Finding("warning", text))
     verdicts += [Finding("warning", text) for text in excitation_warnings(context.gearbox)]
     rated = case.operation.rated_speed_rpm
     fastest = float(run.spectra.speed.max()) / RPM

@@ -178,7 +178,12 @@ class Labels:
         """Return an order as a noun phrase, such as "the 2nd harmonic of the mesh high-speed"."""
         if rotation := _ROTATION.fullmatch(line.name):
             times = int(rotation[1] or 1) * (0.5 if rotation[2] else 1.0)
-            return self._rotation_sentence(times, *rotation.groups()[2:]) + self.causes(line.order, "excitation ")
+            ordinal = {1.0: "1st order", 2.0: "2nd order", 3.0: "3rd order"}.get(times, f"{times:g}th order")
+            if times % 1.0:
+                ordinal = f"order {times:g}"
+            frame = f" in {self.of(rotation[4])}" if rotation[4] else ""
+            named = f"the {ordinal} of the rotation of {self.of(rotation[3])}{frame}"
+            return named + self.causes(line.order, "excitation ")
         if _HARMONIC.fullmatch(line.name) is None:
             return f"the combination {self.labelled(line.name)}{self.causes(line.order, 'excitation ')}"
         harmonic, mesh = self._split(line)
@@ -198,14 +203,6 @@ class Labels:
         """
         acting = excitations_at(self._gearbox, order)
         return f" ({before}{', '.join(map(self.of, acting))})" if acting else ""
-
-    def _rotation_sentence(self, order: float, body: str, carrier: str | None) -> str:
-        """Return an order of a body's rotation as a noun phrase."""
-        ordinal = {1.0: "1st order", 2.0: "2nd order", 3.0: "3rd order"}.get(order, f"{order:g}th order")
-        if order % 1.0:
-            ordinal = f"order {order:g}"
-        frame = f" in {self.of(carrier)}" if carrier else ""
-        return f"the {ordinal} of the rotation of {self.of(body)}{frame}"
 
     def pairs(self, line: OrderLine) -> tuple[int, list[str]]:
         """Return the harmonic of an order and the families of the meshes that excite it; none for a combination."""
@@ -297,6 +294,11 @@ def joined(parts: Iterable[str]) -> str:
     """
     *first, last = parts
     return f"{', '.join(first)} and {last}" if first else last
+
+
+def capitalised(text: str) -> str:
+    """Return a text with its first letter in upper case."""
+    return text[:1].upper() + text[1:]
 
 
 def figure_text(value: float, digits: int = 3) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.linalg
 
 from exugear.gearbox.parts import seat_key
-from exugear.report.pictures.shapes import BodyShape, ModeScene, blank_discs, gear_surface, placed
+from exugear.report.pictures.shapes import BodyShape, ModeScene, placed, shapes_at_seats
 from exugear.system.bodies.reduction import ReducedBody
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Floats, Integers, Pixels
@@ -31,7 +31,6 @@ from fe_ste.tools.drawing import (
 from fe_ste.tools.files import write_file
 
 if TYPE_CHECKING:
-    import PIL.Image
     import pyvista
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
@@ -80,7 +79,11 @@ def write_animation(figures: Sequence[Figure], target: Path, duration: float) ->
     """Write the images of a period as an animated picture; `duration` of a period in s."""
     from PIL import Image
 
-    pictures = [_set_picture(figure) for figure in figures]
+    pictures = []
+    for figure in figures:
+        finished = io.BytesIO()
+        figure.savefig(finished, format="png", dpi=100)
+        pictures.append(Image.open(finished).convert("RGB"))
     # One palette for all frames, otherwise colours flicker.
     palette = pictures[0].quantize(colors=255, method=Image.Quantize.MEDIANCUT)
     # Averaging turns white into light grey, which is set to white again.
@@ -94,15 +97,6 @@ def write_animation(figures: Sequence[Figure], target: Path, duration: float) ->
     indexed[0].save(content, "GIF", save_all=True, append_images=rest, duration=pause, loop=0, optimize=True)
     write_file(target, content.getvalue())
     return target
-
-
-def _set_picture(figure: Figure) -> PIL.Image.Image:
-    """Convert a matplotlib image to a frame."""
-    from PIL import Image
-
-    finished = io.BytesIO()
-    figure.savefig(finished, format="png", dpi=100)
-    return Image.open(finished).convert("RGB")
 
 
 # Pictures and animations of a gearbox and its modes, rendered off-screen with pyvista
@@ -258,9 +252,17 @@ def mode_figure(image: Pixels, pixel: float, title: str, label: str = "Displacem
 
 def body_colours(bodies: Sequence[BodyShape]) -> dict[str, tuple[float, float, float]]:
     """Return the colour of each family of bodies as red, green, blue from 0 to 1; fixed bodies are grey."""
+    from matplotlib.colors import to_rgb
+
     families = list(dict.fromkeys(body.family for body in bodies if not body.fixed))
-    colours = {family: _lightened(BODY_COLOURS[n % len(BODY_COLOURS)]) for n, family in enumerate(families)}
-    return colours | {body.family: _lightened("#8A8F96") for body in bodies if body.fixed}
+    full = {family: BODY_COLOURS[n % len(BODY_COLOURS)] for n, family in enumerate(families)}
+    full |= {body.family: "#8A8F96" for body in bodies if body.fixed}
+    channels = {family: to_rgb(colour) for family, colour in full.items()}
+    # Lighter than in diagrams
+    return {
+        family: (0.35 + 0.65 * red, 0.35 + 0.65 * green, 0.35 + 0.65 * blue)
+        for family, (red, green, blue) in channels.items()
+    }
 
 
 def displacement_map() -> Colormap:
@@ -272,17 +274,6 @@ def displacement_map() -> Colormap:
 
 def _opacity(body: BodyShape) -> float:
     return 0.22 if body.fixed else 1.0
-
-
-def channels(colour: str) -> tuple[float, float, float]:
-    """Return red, green and blue from 0 to 1 of a colour like ``#E4E7EB``."""
-    red, green, blue = (int(colour[start : start + 2], 16) / 255.0 for start in (1, 3, 5))
-    return red, green, blue
-
-
-def _lightened(colour: str) -> tuple[float, float, float]:
-    red, green, blue = channels(colour)
-    return 0.35 + 0.65 * red, 0.35 + 0.65 * green, 0.35 + 0.65 * blue
 
 
 # Pictures and animations of flexible bodies in a mode, deformed and coloured by strain energy
@@ -349,51 +340,30 @@ def elastic_scene(assembly: Assembly, shape: Floats, *, title: str = "", amplitu
     if not largest > 0.0:
         raise ValueError("the mode does not deform the flexible bodies")
     factor = amplitude * max(float(np.ptp(surface.points[:, 2])) for surface, _, _ in deformed) / largest
-    brightest = _density_below(
-        np.concatenate([density for _, _, density in deformed]),
-        np.concatenate([_areas(surface.points, surface.quads) for surface, _, _ in deformed]),
-    )
-    gears, motions = _gears(assembly, factor * shape)
+    densities = np.concatenate([density for _, _, density in deformed])
+    corners = [surface.points[surface.quads] for surface, _, _ in deformed]
+    diagonals = [(own[:, 2] - own[:, 0], own[:, 3] - own[:, 1]) for own in corners]
+    areas = np.concatenate([0.5 * np.linalg.norm(np.cross(*own), axis=1) for own in diagonals])
+    # The density that all but the brightest part of the surface stays below
+    order = np.argsort(densities)
+    share = np.cumsum(areas[order]) / areas.sum()
+    brightest = float(densities[order][np.searchsorted(share, BRIGHTEST / 100.0)]) or 1.0
+    gears = []
+    motions = []
+    for body in assembly.bodies:
+        if body.name in assembly.elastic_bodies and not body.fixed:
+            for seated in shapes_at_seats(assembly.gearbox, body):
+                gears.append(seated)
+                motions.append(factor * shape[list(assembly.coordinates[seat_key(body.name, seated.name)])])
     return ElasticScene(
         bodies=tuple(
             DeformedBody(surface.points, surface.quads, factor * moved, np.minimum(density / brightest, 1.0))
             for surface, moved, density in deformed
         ),
-        gears=gears,
-        motions=motions,
+        gears=tuple(gears),
+        motions=tuple(motions),
         title=title,
     )
-
-
-def _areas(points: Floats, quads: Integers) -> Floats:
-    """Return the area of each quad, m2."""
-    diagonals = points[quads[:, 2]] - points[quads[:, 0]], points[quads[:, 3]] - points[quads[:, 1]]
-    areas: Floats = 0.5 * np.linalg.norm(np.cross(*diagonals), axis=1)
-    return areas
-
-
-def _density_below(density: Floats, area: Floats) -> float:
-    """Return the density that all but the brightest part of the surface stays below."""
-    order = np.argsort(density)
-    share = np.cumsum(area[order]) / area.sum()
-    return float(density[order][np.searchsorted(share, BRIGHTEST / 100.0)]) or 1.0
-
-
-def _gears(assembly: Assembly, shape: Floats) -> tuple[tuple[BodyShape, ...], tuple[Floats, ...]]:
-    """Return gears and discs on flexible shafts, and the motion (6,) of each in a mode shape."""
-    gears = []
-    motions = []
-    for body in assembly.bodies:
-        if body.name not in assembly.elastic_bodies or body.fixed:  # a housing has its ring in its own surface
-            continue
-        for gear, z in body.wheels.items():
-            centre = np.array([*body.axis, z])
-            gears.append(BodyShape(gear, gear, gear_surface(assembly.gearbox.gears[gear]).moved(centre), centre))
-            motions.append(shape[list(assembly.coordinates[seat_key(body.name, gear)])])
-        for seat, (z, disc) in blank_discs(assembly.gearbox, body).items():
-            gears.append(BodyShape(seat, seat, disc, np.array([*body.axis, z])))
-            motions.append(shape[list(assembly.coordinates[seat_key(body.name, seat)])])
-    return tuple(gears), tuple(motions)
 
 
 def draw_elastic_bodies(

@@ -164,12 +164,12 @@ def bodies_of(gearbox: Gearbox) -> tuple[BodyShape, ...]:
     shapes = []
     for body in gearbox.bodies():
         planets = [planet for planet in gearbox.bodies() if planet.carrier == body.name]
-        parts = [
-            gear_surface(gearbox.gears[name], angles.get((body.name, name), 0.0), _rim(gearbox, body, name)).moved(
-                [*body.axis, z]
-            )
-            for name, z in body.wheels.items()
-        ]
+        parts = []
+        for name, z in body.wheels.items():
+            gear = gearbox.gears[name]
+            # On a shaft, the rim ends at the shaft; planets and rings have their fixed diameter.
+            rim = _shaft_diameter(gearbox, body) if _has_shaft(body) and not gear.internal else None
+            parts.append(gear_surface(gear, angles.get((body.name, name), 0.0), rim).moved([*body.axis, z]))
         parts += _shaft(gearbox, body) + _carrier(gearbox, body, planets)
         parts += [disc for _, disc in blank_discs(gearbox, body).values()]
         if parts:
@@ -228,11 +228,6 @@ def _has_shaft(body: Body) -> bool:
     return bool(body.wheels) and not body.fixed and body.carrier is None
 
 
-def _rim(gearbox: Gearbox, body: Body, gear: str) -> float | None:
-    """Return the inner diameter of a gear on a shaft (the shaft's); None for planets and rings: the fixed diameter."""
-    return _shaft_diameter(gearbox, body) if _has_shaft(body) and not gearbox.gears[gear].internal else None
-
-
 def _shaft(gearbox: Gearbox, body: Body) -> list[TriangleSurface]:
     """Return a plain cylinder through the gears of a body, or the pieces of its stepped shape if it has none."""
     if not _has_shaft(body):
@@ -254,8 +249,7 @@ def _shaft(gearbox: Gearbox, body: Body) -> list[TriangleSurface]:
     ends = [z + side * 0.5 * gearbox.gears[name].face_width for name, z in body.wheels.items() for side in (-1.0, 1.0)]
     ends += [bearing.position[2] for bearing in gearbox.bearings if bearing.body == body.name]
     margin = 0.02
-    shaft = tube_surface(_shaft_diameter(gearbox, body), min(ends) - margin, max(ends) + margin, centre=body.axis)
-    return [shaft]
+    return [tube_surface(_shaft_diameter(gearbox, body), min(ends) - margin, max(ends) + margin, centre=body.axis)]
 
 
 def blank_discs(gearbox: Gearbox, body: Body) -> dict[str, tuple[float, TriangleSurface]]:
@@ -280,6 +274,20 @@ def blank_discs(gearbox: Gearbox, body: Body) -> dict[str, tuple[float, Triangle
         half = 0.5 * min(max(width, THINNEST_DISC * diameter), length)
         discs[name] = (z, tube_surface(diameter, z - half, z + half, centre=body.axis))
     return discs
+
+
+def shapes_at_seats(gearbox: Gearbox, body: Body) -> list[BodyShape]:
+    """Return the gears of a flexible body and the discs at its other seats, each under the name of its seat.
+
+    A fixed body, such as a housing, has its ring gears in its own surface.
+    """
+    shapes = []
+    for gear, z in {} if body.fixed else body.wheels.items():
+        centre = np.array([*body.axis, z])
+        shapes.append(BodyShape(gear, gear, gear_surface(gearbox.gears[gear]).moved(centre), centre))
+    for seat, (z, disc) in blank_discs(gearbox, body).items():
+        shapes.append(BodyShape(seat, seat, disc, np.array([*body.axis, z])))
+    return shapes
 
 
 def _carrier(gearbox: Gearbox, body: Body, planets: Sequence[Body]) -> list[TriangleSurface]:

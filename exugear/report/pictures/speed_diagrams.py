@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from exugear.gearbox.units import RPM
-from exugear.report.findings.ranking import AROUND, Envelope, Ranking, Resonance
+from exugear.report.findings.ranking import AROUND, Envelope, Ranking
 from exugear.results.spectra.waterfall import OrderLine
 from fe_ste.tools.arrays import Floats
 
@@ -108,7 +108,7 @@ def _frame(
     low, high = (min(max(speed / RPM, speeds[0]), speeds[1]) for speed in ranking.speeds)
     span = None if ranking.whole else (frame.x(low), frame.x(high))
     at_rated = frame.x(rated) if rated is not None and speeds[0] <= rated <= speeds[1] else None
-    return Frame(width, height, frame.left, frame.right, frame.bottom, speeds, ticks, span, at_rated)
+    return replace(frame, ticks=ticks, span=span, rated=at_rated)
 
 
 # Amplitudes over speed: one strip a quantity
@@ -177,8 +177,11 @@ def _strip(
     shown = (rpm >= frame.speeds[0]) & (rpm <= frame.speeds[1])
     rpm = rpm[shown]
     value = np.nan_to_num(factor * curve.amplitude[shown], posinf=0.0)
-    numbered = list(enumerate(ranking.resonances[:CIRCLED], start=1))
-    marked = [(number, own) for number, own in numbered if _is_marked(own, name)]
+    marked = []
+    for number, own in enumerate(ranking.resonances[:CIRCLED], start=1):
+        amplitude = own.amplitudes.get(name)
+        if amplitude and amplitude.place and amplitude.place <= CIRCLED:  # among the highest in this quantity
+            marked.append((number, own))
     limits = {number: own.amplitudes[name].limits for number, own in marked}
     ends = [factor * limit.amplitude for pair in limits.values() for limit in pair or ()]
     peak = max(size for size in (*map(float, value), *ends, 1e-300) if math.isfinite(size))
@@ -202,12 +205,6 @@ def _strip(
     points = " L".join(f"{frame.x(at):.1f} {y(size):.1f}" for at, size in zip(rpm, value, strict=True))
     ticks = tuple(Mark(frame.left - 5.0, y(tick) + 3.5, f"{tick:g}") for tick in _decades(lowest, highest))
     return Strip(name, label, top, bottom, f"M{points}" if points else "", tuple(bands), ticks, tuple(circles))
-
-
-def _is_marked(resonance: Resonance, name: str) -> bool:
-    """Return whether a resonance is circled in a quantity: it is among the highest there."""
-    own = resonance.amplitudes.get(name)
-    return own is not None and own.place is not None and own.place <= CIRCLED
 
 
 def _free(x: float, y: float, text: str, taken: Sequence[Mark]) -> Mark:

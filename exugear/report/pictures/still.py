@@ -58,7 +58,12 @@ def mode_picture(bodies: Sequence[tuple[BodyShape, Floats, Floats | None]]) -> b
     opacity = np.where(np.isfinite(veil_near) & (veil_near > near), VEIL, 0.0)[..., None]
     picture = (1.0 - opacity) * solid + opacity * veil
     picture[..., 3] = np.maximum(solid[..., 3], np.where(np.isfinite(veil_near), VEIL, 0.0))
-    return png(_averaged(picture))
+    # Average each square of fine pixels; colours are weighted by opacity.
+    blocks = picture.reshape(SIZE, FINER, SIZE, FINER, 4)
+    opacities = blocks[..., 3:]
+    whole = opacities.sum(axis=(1, 3))
+    colour = (blocks[..., :3] * opacities).sum(axis=(1, 3)) / np.maximum(whole, 1e-12)
+    return png(np.clip(np.concatenate([colour, whole / FINER**2], axis=-1), 0.0, 1.0))
 
 
 def _samples(
@@ -104,12 +109,3 @@ def _layer(samples: Sequence[tuple[Floats, Floats, Floats]], pixels: int) -> tup
     picture.reshape(-1, 4)[filled] = colour
     depth.reshape(-1)[filled] = place[shown, 2]
     return picture, depth
-
-
-def _averaged(picture: Floats) -> Floats:
-    """Return the picture with each square of fine pixels averaged, colours weighted by opacity."""
-    blocks = picture.reshape(SIZE, FINER, SIZE, FINER, 4)
-    opacity = blocks[..., 3:]
-    whole = opacity.sum(axis=(1, 3))
-    colour = (blocks[..., :3] * opacity).sum(axis=(1, 3)) / np.maximum(whole, 1e-12)
-    return np.asarray(np.clip(np.concatenate([colour, whole / FINER**2], axis=-1), 0.0, 1.0))

@@ -13,16 +13,11 @@ from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import excitations
 from exugear.report.findings.facts import MOST_WORDS, facts_of_response, short
-from exugear.report.findings.headline import (
-    Headline,
-    MatchedMode,
-    causes_of,
-    contributions_of,
-)
+from exugear.report.findings.headline import Headline, MatchedMode, causes_of, contributions_of
 from exugear.report.findings.margins import shortfalls_of
-from exugear.report.findings.parameter_variations import default_place, track_mode
+from exugear.report.findings.parameter_variations import default_place, track_mode, variations_of
 from exugear.report.findings.ranking import Envelope, Resonance, envelopes
-from exugear.report.findings.words import QUANTITIES, percentages, rounded_text
+from exugear.report.findings.words import QUANTITIES, capitalised, percentages, rounded_text
 from exugear.report.pictures.png import png_address
 from exugear.report.pictures.speed_diagrams import Strips, strips_of
 from exugear.report.pictures.still import mode_picture
@@ -83,7 +78,14 @@ def answer_section(material: ReportData) -> Part:
         lines = [fact.line for data in material.results.steady for fact in facts_of_response(material.words, data)]
         notes.extend(lines)
         return Part(render("answer", answer=None, lines=lines), title="Answer", name="answer")
-    notes.append(f"Results: {_scope(material, headline)}")
+    gearbox = material.context.gearbox
+    load = material.words.labelled(headline.load or f"static load, {static_load_in_words(gearbox)}")
+    scope = (
+        f"{Variant.of(headline.choice.variant).label}, {headline.source}. Load: {load}. Inertia set: "
+        f"{headline.choice.inertias}. Damping: {damping_in_words(gearbox.case.damping)}. Speeds: of the "
+        f"{material.input_words}."
+    )
+    notes.append(f"Results: {scope}")
     top = headline.top
     assert top is not None
     mode = headline.mode_of(top)
@@ -99,7 +101,7 @@ def answer_section(material: ReportData) -> Part:
     group = headline.group
     listed = () if group is None else material.lists[group.name, headline.choice.variant]
     answer: dict[str, Any] = {
-        "scope": _scope(material, headline),
+        "scope": scope,
         "kicker": _kicker(headline),
         "frequency": f"{rounded_text(top.frequency)} Hz",
         "speed": speed_text(top),
@@ -137,16 +139,6 @@ def answer_section(material: ReportData) -> Part:
     return Part(html, {"curves": readout}, "Answer", "answer")
 
 
-def _scope(material: ReportData, headline: Headline) -> str:
-    gearbox = material.context.gearbox
-    load = material.words.labelled(headline.load or f"static load, {static_load_in_words(gearbox)}")
-    return (
-        f"{Variant.of(headline.choice.variant).label}, {headline.source}. Load: {load}. Inertia set: "
-        f"{headline.choice.inertias}. Damping: {damping_in_words(gearbox.case.damping)}. Speeds: of the "
-        f"{material.input_words}."
-    )
-
-
 def amplitude_text(name: str, amplitude: float) -> str:
     """Return an amplitude of one of the quantities (SI units) as text."""
     label = QUANTITIES[name]
@@ -168,7 +160,7 @@ def _kicker(headline: Headline) -> str:
 
 
 def _off_rated(material: ReportData, resonance: Resonance) -> str:
-    rated = material.context.gearbox.case.operation.rated_speed_rpm
+    rated = material.rated_rpm
     if rated is None:
         return ""
     off = abs(resonance.speed) / RPM / rated - 1.0
@@ -178,8 +170,7 @@ def _off_rated(material: ReportData, resonance: Resonance) -> str:
 
 
 def _sentence(material: ReportData, headline: Headline, top: Resonance, mode: MatchedMode | None) -> str:
-    line = material.words.line_sentence(material.words.order(top.line, top.order))
-    line = f"{line[0].upper()}{line[1:]}"
+    line = capitalised(material.words.line_sentence(material.words.order(top.line, top.order)))
     if mode is None or headline.modes is None:
         name = material.words.labelled(headline.mode_name(top))
         sentences = [f"{line} excites the mode {name}."] if name else []
@@ -217,8 +208,8 @@ def _strips(
         f"{number}: {rounded_text(own.frequency)} Hz at {speed_text(own)}"
         for number, own in enumerate(headline.ranking.resonances[:SHOWN], start=1)
     )
-    rated = material.context.gearbox.case.operation.rated_speed_rpm
-    return strips_of(headline.ranking, curves, titles, rated, size, f"Largest order over speed. {peaks}.")
+    words = f"Largest order over speed. {peaks}."
+    return strips_of(headline.ranking, curves, titles, material.rated_rpm, size, words)
 
 
 def _resonance_box(material: ReportData, headline: Headline, mode: MatchedMode | None) -> Box:
@@ -261,9 +252,8 @@ def _cause_box(material: ReportData, headline: Headline, top: Resonance, known: 
         f"Its part of the static transmission error ({rounded_text(1e6 * first.swing)} µm peak-to-peak): "
         f"±{rounded_text(1e6 * first.amplitude)} µm.",
     )
-    facts = []
     of_pairs = [(cause.pair, cause.share) for cause in causes if cause.share is not None]
-    facts += _share_facts(material, [*of_pairs, *shares])
+    facts = _share_facts(material, [*of_pairs, *shares])
     if LAWS[headline.choice.mesh_model].moves_load and not headline.choice.variant.spins_only:
         context = material.context
         moved = {own.pair: own for own in shuttling_pairs(context.gearbox, context.folder, first.harmonic)}
@@ -277,7 +267,7 @@ def _cause_box(material: ReportData, headline: Headline, top: Resonance, known: 
             if parts:
                 moving += f"; its part of the amplitude: {100.0 * sum(parts):.0f} %".replace("-", "−")
             facts.append(("Shuttling", moving))
-    overlap = f"{rounded_text(first.overlap)}"
+    overlap = rounded_text(first.overlap)
     if first.overlap == 0.0:
         overlap += " (spur gears)"
     elif abs(first.overlap - round(first.overlap)) > 0.1:
@@ -317,7 +307,7 @@ def _further(
         yield "Requirements not met", lines
     if leaders := list(_leaders(material, headline, top)):
         yield "Highest in other quantities", leaders
-    rated = material.context.gearbox.case.operation.rated_speed_rpm
+    rated = material.rated_rpm
     if rated is not None and curves:
         yield f"At rated speed, {rounded_text(rated)} rpm", _rated_lines(headline, curves, rated)
     if headline.response is not None and (sound := sound_over_speed(headline.response)) is not None:
@@ -392,7 +382,7 @@ def _rated_lines(headline: Headline, curves: Mapping[str, Envelope], rated: floa
     ]
     text = ", ".join(amplitude_text(name, value) for name, value in values.items())
     at = f" Resonance {near[0]} of the ranking." if near else ""
-    lines = [f"{text[0].upper()}{text[1:]}.{at}"]
+    lines = [f"{capitalised(text)}.{at}"]
     for name, value in values.items():
         leader = headline.ranking.leader(name)
         if leader is not None and value > leader.amplitudes[name].amplitude:
@@ -415,9 +405,8 @@ def _doubts(material: ReportData, headline: Headline, top: Resonance) -> Iterato
                 f"{amplitude_text(quantity, first.amplitudes[quantity].amplitude)}."
             )
     mode = headline.mode_of(top)
-    own = next((one.variations for one in material.variations if one.choice == headline.choice), ())
-    for variation in own:
-        label, _, unit = material.words.parameter(variation.parameter.label).partition(" / ")
+    for variation in variations_of(material.variations, headline.choice):
+        label = material.words.parameter(variation.parameter.label).partition(" / ")[0]
         if mode is None or not label.startswith("housing"):
             continue
         seen = track_mode(variation, mode.frequency).frequency
@@ -425,7 +414,7 @@ def _doubts(material: ReportData, headline: Headline, top: Resonance) -> Iterato
         place = default_place(variation)
         ends = [rounded_text(float(seen[n])) for n in (0, -1)]
         yield (
-            f"{label[0].upper()}{label[1:]} {values[0]:g} to {values[-1]:g} instead of {values[place]:g}: "
+            f"{capitalised(label)} {values[0]:g} to {values[-1]:g} instead of {values[place]:g}: "
             f"{ends[0]} to {ends[1]} Hz."
         )
     places = top.amplitudes[headline.ranking.quantity].places

@@ -18,7 +18,7 @@ from exugear.life.life import LEAST_OUTSIDE
 from exugear.life.life_file import draw_life, limits
 from exugear.report.findings.context import model_label, response_label
 from exugear.report.findings.groups import RunGroup
-from exugear.report.findings.words import figure_text
+from exugear.report.findings.words import capitalised, figure_text
 from exugear.report.pictures.png import png_address
 from exugear.report.sections.material import Part, ReportData, model_name
 from exugear.report.web.html import Cell, Table, render
@@ -48,19 +48,14 @@ MIN_RELATIVE_ACCELERATION = 1e-3
 
 def bearings_section(material: ReportData) -> Part:
     """List bearing forces by result group, accelerations by steady-state response and static bearing loads by model."""
-    forces = [
-        _forces(data, group, variant)
-        for data, group in zip(material.run_data["groups"], material.groups, strict=True)
-        for variant in group.runs
-    ]
-    forces = list(filter(None, forces))
+    groups = zip(material.run_data["groups"], material.groups, strict=True)
+    forces = list(filter(None, (_forces(data, group, variant) for data, group in groups for variant in group.runs)))
     accelerations = list(filter(None, (_accelerations(material, data) for data in material.results.steady)))
     duties = list(filter(None, (_duties(material, assembly) for assembly in material.context.assemblies.values())))
     lives = [_rated_variant(material, data) for data in material.ratings.lives]
     data = {} if material.ratings.sheet is None else {"rating": material.ratings.sheet.summary()}
     for life in material.ratings.lives:
-        worst = limits(life)
-        if worst:
+        if worst := limits(life):
             part, kind, damage = worst[0]
             size = "infinite" if math.isinf(damage) else f"{damage:.3g}"
             material.context.notes.statements.append(
@@ -69,14 +64,7 @@ def bearings_section(material: ReportData) -> Part:
             )
     if not (forces or accelerations or duties or lives):
         return Part(data=data)
-    html = render(
-        "bearings",
-        forces=forces,
-        accelerations=accelerations,
-        seats=SEATS,
-        duties=duties,
-        lives=lives,
-    )
+    html = render("bearings", forces=forces, accelerations=accelerations, seats=SEATS, duties=duties, lives=lives)
     return Part(html, data, "Bearings and life", "bearings")
 
 
@@ -131,7 +119,7 @@ def _force_row(
             "mean radial force / kN": Cell(figure_text(1e-3 * mean), 1e-3 * mean),
             "mean axial force / kN": Cell(figure_text(axial), axial),
             **measures,
-            ("amplitude over mean / %"): Cell(
+            "amplitude over mean / %": Cell(
                 figure_text(100.0 * share, 2) if math.isfinite(share) else "–",
                 100.0 * share,
                 caveat=lifts if share > CONTACT_LOSS_RATIO else "",
@@ -225,12 +213,7 @@ def _mesh_row(material: ReportData, duty: MeshLoadState) -> dict[str, object]:
 
 
 def _duty_row(material: ReportData, duty: BearingLoadState) -> dict[str, object]:
-    if duty.ratings.estimated:
-        sign = "*"
-    elif duty.ratings.makers:
-        sign = "+"
-    else:
-        sign = ""
+    sign = "*" if duty.ratings.estimated else "+" if duty.ratings.makers else ""
     tilt = 0.5e-6 * float(duty.stiffness[3, 3] + duty.stiffness[4, 4])
     return {
         "bearing": material.words.of(duty.name),
@@ -265,7 +248,6 @@ def _rated_variant(material: ReportData, data: xr.Dataset) -> dict[str, Any]:
     )
     name = model_label(choice_of(data.attrs))
     label = f"life-{data.attrs['variant']}-{data.attrs['mesh_model']}"
-
     remarks = {labelled(bearing): said for bearing, said in json.loads(data.attrs["bearing_remarks"]).items()}
 
     def listed(*keys: str) -> list[str]:
@@ -276,7 +258,7 @@ def _rated_variant(material: ReportData, data: xr.Dataset) -> dict[str, Any]:
     draw_life(data).savefig(content, format="png", dpi=130)
     return {
         "model": model_name(choice_of(data.attrs)),
-        "title": f"{name[0].upper()}{name[1:]}, gears to {data.attrs['edition']}",
+        "title": f"{capitalised(name)}, gears to {data.attrs['edition']}",
         "failures": listed("failures"),
         "shortfalls": listed("shortfalls"),
         "reliefs": listed("reliefs"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -24,10 +24,9 @@ from exugear.report.findings.design_changes import (
 from exugear.report.findings.facts import best_words, sensitivities_of, shift_text
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.headline import Headline, headline_of_group
-from exugear.report.findings.other_design import HighestAmplitude, change_in_decibels, highest_within
-from exugear.report.findings.parameter_variations import best_change, track_mode
+from exugear.report.findings.other_design import change_in_decibels, highest_within
+from exugear.report.findings.parameter_variations import best_change, track_mode, variations_of
 from exugear.report.findings.proposals import ASSUMPTION
-from exugear.report.findings.ranking import Envelope
 from exugear.report.findings.words import QUANTITIES, figure_text, rounded_text
 from exugear.report.sections.material import ChartAxis, Curve, Part, ReportData
 from exugear.report.web.html import Cell, Figure, Table, render
@@ -35,9 +34,6 @@ from exugear.results.folder import DESIGN_CHANGES_FILE
 from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.system.sensitivity import ParameterVariation
 from fe_ste.tools.files import FileError
-
-if TYPE_CHECKING:
-    pass
 
 CHANGES_NAME = "changes"
 """Identifier of the part."""
@@ -100,10 +96,10 @@ def stored_study(context: Context) -> DesignStudy | None:
         context.notes.left_out.append(str(error))
         return None
     except (ValueError, KeyError, SteadyError) as error:
-        context.notes.left_out.append(f"{context.name_of(path)}: {error}")
+        context.leave_out(path, error)
         return None
     if not fits:
-        context.notes.left_out.append(f"{context.name_of(path)}: {OTHER_INPUT}")
+        context.leave_out(path, OTHER_INPUT)
         return None
     return study
 
@@ -172,15 +168,40 @@ def _compared(material: ReportData) -> dict[str, Any] | None:
     other_curves = other.headline.envelopes(other.lines)
     rows: list[dict[str, object]] = []
     figures: list[Figure] = []
-    for name in QUANTITIES:
+    for name, label in QUANTITIES.items():
         if name not in curves or name not in other_curves:
             continue
         own = highest_within(curves[name], headline.ranking.speeds)
         others = highest_within(other_curves[name], headline.ranking.speeds)
         if own is None or others is None:
             continue
-        rows.append(_compared_row(material, name, (this, own), (other.name, others)))
-        figures.append(_figure(material, name, (this, curves[name]), (other.name, other_curves[name])))
+        row: dict[str, object] = {"quantity": f"{label.title}, ± / {label.unit}"}
+        said = []
+        drawn = []
+        for design, highest, curve, style in (
+            (this, own, curves[name], "thin"),
+            (other.name, others, other_curves[name], "line"),
+        ):
+            amplitude = label.factor * highest.amplitude
+            row[design] = _number(amplitude)
+            row[f"{design} / rpm"] = _number(highest.speed / RPM)
+            said.append(f"{design} ±{rounded_text(amplitude)} {label.unit}")
+            drawn.append(Curve(design, curve.speed / RPM, label.factor * curve.amplitude, style))
+        change = change_in_decibels(own, others)
+        row["change / dB"] = _number(round(change, 1) + 0.0, "+.1f")
+        rows.append(row)
+        statement = f"{label.title}, highest in the range: {', '.join(said)} ({change:+.1f} dB)."
+        material.context.notes.statements.append(statement)
+        figures.append(
+            material.chart(
+                f"compared-{name}",
+                f"{label.title} ± / {label.unit}",
+                "Largest single order over speed.",
+                f"{this} and {other.name}",
+                drawn,
+                [ChartAxis(f"{material.input_words} speed / rpm"), ChartAxis(f"± {label.unit}")],
+            )
+        )
     first = other.headline.top
     leads = "" if first is None else f"{rounded_text(first.frequency)} Hz at {rounded_text(abs(first.speed) / RPM)} rpm"
     return {
@@ -201,38 +222,6 @@ def _compared(material: ReportData) -> dict[str, Any] | None:
         ),
         "more": max(len(other.differences) - SHOWN_KEYS, 0),
     }
-
-
-def _compared_row(
-    material: ReportData, name: str, own: tuple[str, HighestAmplitude], other: tuple[str, HighestAmplitude]
-) -> dict[str, object]:
-    """Return a row of the table of amplitudes, and note it for the command line."""
-    label = QUANTITIES[name]
-    change = change_in_decibels(own[1], other[1])
-    row: dict[str, object] = {"quantity": f"{label.title}, ± / {label.unit}"}
-    said = []
-    for design, highest in (own, other):
-        amplitude = label.factor * highest.amplitude
-        row[design] = _number(amplitude)
-        row[f"{design} / rpm"] = _number(highest.speed / RPM)
-        said.append(f"{design} ±{rounded_text(amplitude)} {label.unit}")
-    row["change / dB"] = _number(round(change, 1) + 0.0, "+.1f")
-    statement = f"{label.title}, highest in the range: {', '.join(said)} ({change:+.1f} dB)."
-    material.context.notes.statements.append(statement)
-    return row
-
-
-def _figure(material: ReportData, name: str, own: tuple[str, Envelope], other: tuple[str, Envelope]) -> Figure:
-    label = QUANTITIES[name]
-    curves = [
-        Curve(design, curve.speed / RPM, label.factor * curve.amplitude, style)
-        for (design, curve), style in ((own, "thin"), (other, "line"))
-    ]
-    title = f"{label.title} ± / {label.unit}"
-    axes = [ChartAxis(f"{material.input_words} speed / rpm"), ChartAxis(f"± {label.unit}")]
-    return material.chart(
-        f"compared-{name}", title, "Largest single order over speed.", f"{own[0]} and {other[0]}", curves, axes
-    )
 
 
 def _number(value: float, form: str = "") -> Cell:
@@ -265,7 +254,7 @@ def _sensitivity(material: ReportData, group: RunGroup) -> dict[str, Any] | None
         f"For the mode at {frequency:.1f} Hz {Variant.of(group.main).label}, inertia set {group.inertias}: "
         f"{material.words.moves(modes, mode)}."
     )
-    varied = next((one.variations for one in material.variations if one.choice == own.choice), ())
+    varied = variations_of(material.variations, own.choice)
     sensitivities = sensitivities_of(material.words, modes, mode)
     largest = max((abs(sensitivity.shift) for sensitivity in sensitivities), default=1.0)
     kinds = [

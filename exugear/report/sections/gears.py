@@ -40,22 +40,21 @@ def gears_section(material: ReportData) -> Part:
     ripples = {own.pair: own for own in found}
     curves = [Curve(material.words.of(own.pair), own.position, 1e6 * (own.error - own.error.mean())) for own in found]
     gearbox = material.context.gearbox
-    rows = []
-    for name, gear in gearbox.gears.items():
-        rows.append(
-            {
-                "gear": material.words.of(name),
-                "teeth": gear.teeth,
-                "kind": "internal" if gear.internal else "external",
-                "module / mm": f"{1e3 * gear.normal_module:g}",
-                "pressure angle / °": f"{math.degrees(gear.normal_pressure_angle):g}",
-                "helix angle / °": f"{math.degrees(gear.helix_angle):g}",
-                "profile shift": f"{gear.profile_shift:g}",
-                "face width / mm": f"{1e3 * gear.face_width:g}",
-                "tip diameter / mm": f"{2e3 * gear.tip_radius:.2f}",
-                "root diameter / mm": f"{2e3 * gear.root_radius:.2f}",
-            }
-        )
+    rows = [
+        {
+            "gear": material.words.of(name),
+            "teeth": gear.teeth,
+            "kind": "internal" if gear.internal else "external",
+            "module / mm": f"{1e3 * gear.normal_module:g}",
+            "pressure angle / °": f"{math.degrees(gear.normal_pressure_angle):g}",
+            "helix angle / °": f"{math.degrees(gear.helix_angle):g}",
+            "profile shift": f"{gear.profile_shift:g}",
+            "face width / mm": f"{1e3 * gear.face_width:g}",
+            "tip diameter / mm": f"{2e3 * gear.tip_radius:.2f}",
+            "root diameter / mm": f"{2e3 * gear.root_radius:.2f}",
+        }
+        for name, gear in gearbox.gears.items()
+    ]
     html = render(
         "gears",
         scope="" if headline is None else f"Static load, no load factors. Model: {model_label(headline.choice)}.",
@@ -208,10 +207,10 @@ def _pair(material: ReportData, own: PairContact, ripple: PairExcitation | None)
     states = {"Aligned": own.aligned, "Misaligned as under the static load": own.actual}
     highest = max(state.highest[0] for state in states.values())
     heaviest = 1.05 * max(float(state.line_load.max()) for state in states.values())
-    maps = []
-    for title, state in states.items():
-        words = f"{title}: pressure over the flank; line load along the face."
-        maps.append((title, flank_map(state, highest, heaviest, words)))
+    maps = [
+        (title, flank_map(state, highest, heaviest, f"{title}: pressure over the flank; line load along the face."))
+        for title, state in states.items()
+    ]
     pinion = material.words.of(own.pair.pinion.name)
     return {
         "title": f"{material.words.of(own.pair.name)}, flank of {pinion}",

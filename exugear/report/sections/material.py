@@ -20,10 +20,10 @@ from exugear.report.findings.other_design import OtherDesign
 from exugear.report.findings.parameter_variations import ModelVariations
 from exugear.report.findings.ratings import Ratings
 from exugear.report.findings.resonance_list import ListedResonance
-from exugear.report.findings.words import Labels
+from exugear.report.findings.words import Labels, capitalised
 from exugear.report.web.document import ArrayStore
 from exugear.report.web.html import Figure
-from exugear.results.spectra.waterfall import OrderLine, order_lines
+from exugear.results.spectra.waterfall import OrderLine
 
 # Line charts as data: curves with axes and marks, drawn by one script
 
@@ -85,6 +85,11 @@ class ReportData:
         return self.words.of(self.context.gearbox.case.overall.input)
 
     @property
+    def rated_rpm(self) -> float | None:
+        """Rated speed of the overall input, rpm; None if the file has none."""
+        return self.context.gearbox.case.operation.rated_speed_rpm
+
+    @property
     def file_words(self) -> str:
         """Gearbox file with its folder only, as the page may be passed on and should not show local paths."""
         return "/".join(Path(self.context.gearbox.source).parts[-2:])
@@ -126,11 +131,6 @@ class ReportData:
         return Figure(name, title, hint, words, "chart")
 
 
-def lines_of(context: Context) -> tuple[OrderLine, ...]:
-    """Return the orders drawn on the page."""
-    return order_lines(context.gearbox)
-
-
 @dataclass(frozen=True)
 class Part:
     """Output of a section."""
@@ -151,8 +151,7 @@ def source_words(material: ReportData, own: RunGroup) -> str:
         parts.append("static load")
     if len({group.mesh_model for group in material.groups}) > 1:
         parts.append(MESH_MODEL_LABELS[own.mesh_model])
-    words = ", ".join(parts)
-    return words[0].upper() + words[1:]
+    return capitalised(", ".join(parts))
 
 
 def group_words(groups: Sequence[RunGroup], own: RunGroup) -> str:
@@ -162,8 +161,7 @@ def group_words(groups: Sequence[RunGroup], own: RunGroup) -> str:
         parts.append(MESH_MODEL_LABELS[own.mesh_model])
     if len({group.inertias for group in groups}) > 1:
         parts.append(f"inertia set {own.inertias}")
-    words = ", ".join(parts)
-    return words[0].upper() + words[1:]
+    return capitalised(", ".join(parts))
 
 
 def model_name(choice: Choice) -> str:

@@ -21,12 +21,8 @@ CHART_ORDERS = 3
 """Number of orders of a chart, those with the highest measured amplitudes: its curves differ in colour."""
 
 
-def measured_run_ups(material: ReportData) -> list[dict[str, Any]]:
-    """Return the stored comparisons of the gearbox for the template of the resonances."""
-    return [_comparison(material, data) for data in material.results.measured]
-
-
-def _comparison(material: ReportData, data: xr.Dataset) -> dict[str, Any]:
+def measured_run_up(material: ReportData, data: xr.Dataset) -> dict[str, Any]:
+    """Return a stored comparison of the gearbox for the template of the resonances."""
     attributes = data.attrs
     choice = choice_of(attributes)
     name = f"measured-{attributes['measurement']}-{model_name(choice)}"

@@ -14,6 +14,7 @@ import numpy as np
 
 from exugear.gearbox.choice import Choice, choice_of
 from exugear.gearbox.load_cases import static_load_in_words
+from exugear.gearbox.reading import flattened
 from exugear.gearbox.units import RPM
 from exugear.report.findings.context import (
     MESH_MODEL_LABELS,
@@ -25,6 +26,7 @@ from exugear.report.findings.context import (
 from exugear.report.findings.facts import facts_of
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.result_checks import run_figures, validity_checks
+from exugear.report.findings.words import capitalised
 from exugear.report.pictures.png import png_address
 from exugear.report.sections.material import ChartAxis, Curve, Part, ReportData, group_words, model_name
 from exugear.report.web.document import libraries, licences
@@ -87,21 +89,6 @@ def model_section(material: ReportData) -> Part:
     results = material.results
     groups = _compared_groups(material)
     inputs = [{"key": key, "value": value} for key, value in flat_keys(material.context.gearbox.content)]
-    gearbox = material.context.gearbox
-    case = material.context.gearbox.case
-    acceleration = np.linalg.norm(case.gravity.acceleration_m_per_s2)
-    listed = [
-        f"Inertia sets: {', '.join(gearbox.inertia_sets)}; default {case.default_inertias}.",
-        f"Housing stiffness factor of bearings in the housing: {case.housing.factor:g}.",
-        f"Damping: {damping_in_words(case.damping)}.",
-        f"Gravity {'off' if acceleration == 0.0 else f'{acceleration:.2f} m/s²'}.",
-        f"Mesh stiffness at the static load, {static_load_in_words(gearbox)}; meshes are bilateral (they transmit "
-        "tension); the time with tensile mesh force is recorded.",
-        "Modes: linearised at the static load, mesh stiffness averaged over the mesh cycle.",
-        *_elastic_words(material),
-    ]
-    if friction := case.damping.tooth_friction:
-        listed.append(f"Friction of teeth in runs and steady-state responses: coefficient {friction:g}.")
     html = render(
         "model",
         groups=groups,
@@ -110,7 +97,7 @@ def model_section(material: ReportData) -> Part:
         studies=list(map(_study, stored_studies(material.context.folder, material.context.gearbox))),
         notes=material.context.notes,
         missing=material.missing,
-        assumptions=[*listed, *_deviation_words(material), *_excitation_words(material)],
+        assumptions=list(_assumptions(material)),
         source=material.file_words,
         runs=Table(
             [_run_row(material, run) for run in results.runs],
@@ -150,22 +137,33 @@ def model_section(material: ReportData) -> Part:
     return Part(html, title="Model and checks", name="model")
 
 
-def _deviation_words(material: ReportData) -> Iterator[str]:
+def _assumptions(material: ReportData) -> Iterator[str]:
+    """Yield what the results rest on; deviations of gears and stated loads, used or left out, come last."""
+    gearbox = material.context.gearbox
+    case = gearbox.case
+    acceleration = np.linalg.norm(case.gravity.acceleration_m_per_s2)
+    yield f"Inertia sets: {', '.join(gearbox.inertia_sets)}; default {case.default_inertias}."
+    yield f"Housing stiffness factor of bearings in the housing: {case.housing.factor:g}."
+    yield f"Damping: {damping_in_words(case.damping)}."
+    yield f"Gravity {'off' if acceleration == 0.0 else f'{acceleration:.2f} m/s²'}."
+    yield (
+        f"Mesh stiffness at the static load, {static_load_in_words(gearbox)}; meshes are bilateral (they transmit "
+        "tension); the time with tensile mesh force is recorded."
+    )
+    yield "Modes: linearised at the static load, mesh stiffness averaged over the mesh cycle."
+    yield from _elastic_words(material)
+    if friction := case.damping.tooth_friction:
+        yield f"Friction of teeth in runs and steady-state responses: coefficient {friction:g}."
     gears = []
-    for (body, gear), deviation in material.context.gearbox.deviations.items():
+    for (body, gear), deviation in gearbox.deviations.items():
         pitch = float(np.ptp(deviation.pitch)) if deviation.pitch.size else 0.0
         sizes = {"pitch": pitch, "eccentricity": deviation.eccentricity}
         parts = [f"{name} {1e6 * size:.3g} µm" for name, size in sizes.items() if size > 0.0]
         gears.append(f"{material.words.of(gear)} on {material.words.of(body)} ({', '.join(parts)})")
     if gears:
         yield f"Deviations of gears, pitch over one revolution: {'; '.join(gears)}."
-
-
-def _excitation_words(material: ReportData) -> Iterator[str]:
-    """List the stated loads with body and orders, and those that are left out."""
-    context = material.context
     orders: dict[tuple[str, str], set[float]] = {}
-    for load in context.gearbox.varying_loads:
+    for load in gearbox.varying_loads:
         orders.setdefault((load.excitation, load.body), set()).add(load.order)
     acting = [
         f"{material.words.of(name)} (order{'s' * (len(own) > 1)} {', '.join(f'{number:g}' for number in sorted(own))} "
@@ -175,7 +173,7 @@ def _excitation_words(material: ReportData) -> Iterator[str]:
     if acting:
         yield f"Excitations beside the gears, at the static torque: {'; '.join(acting)}."
     names = {name for name, _ in orders}
-    if without := [material.words.of(name) for name in context.gearbox.case.excitations if name not in names]:
+    if without := [material.words.of(name) for name in case.excitations if name not in names]:
         yield f"Excitations of the file that are left out: {', '.join(without)}."
 
 
@@ -186,11 +184,9 @@ def _elastic_words(material: ReportData) -> Iterator[str]:
     if assembly is None:
         return
     case = context.gearbox.case
-    parts = []
-    for name, body in assembly.elastic_bodies.items():
-        parts.append(f"{name} ({body.reduced.origin})")
+    parts = ", ".join(f"{name} ({body.reduced.origin})" for name, body in assembly.elastic_bodies.items())
     yield (
-        f"Flexible in the variant {assembly.variant}: {', '.join(parts)}; damping {1e6 * case.damping.body_time_s:g} "
+        f"Flexible in the variant {assembly.variant}: {parts}; damping {1e6 * case.damping.body_time_s:g} "
         f"µs times the stiffness, modes listed up to {case.elasticity.band_Hz:g} Hz."
     )
     for name, body in assembly.elastic_bodies.items():
@@ -261,7 +257,7 @@ def _run_row(material: ReportData, run: VariantRun) -> dict[str, object]:
     }
 
 
-def flat_keys(content: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, str]]:
+def flat_keys(content: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """Yield all keys of a gearbox file with their tables, and their values as text.
 
     Examples
@@ -269,11 +265,8 @@ def flat_keys(content: Mapping[str, Any], before: str = "") -> Iterator[tuple[st
     >>> list(flat_keys({"name": "box", "gears": {"sun": {"teeth": 21}}}))
     [('name', 'box'), ('gears.sun.teeth', '21')]
     """
-    for key, value in content.items():
-        if isinstance(value, Mapping):
-            yield from flat_keys(value, f"{before}{key}.")
-        else:
-            yield f"{before}{key}", value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+    for key, value in flattened(content).items():
+        yield key, value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
 
 
 def _hashes(material: ReportData) -> list[dict[str, str]]:
@@ -318,7 +311,7 @@ def _compared_groups(material: ReportData) -> list[dict[str, Any]]:
             {
                 "name": group.name,
                 "scope": (
-                    f"{group.title[0].upper()}{group.title[1:]}. Load: {_load_of(material, group)}. Speeds: of the "
+                    f"{capitalised(group.title)}. Load: {_load_of(material, group)}. Speeds: of the "
                     f"{material.input_words}. Levels: overall transmission error (TE), 0 dB = 1 µm."
                 ),
                 "facts": facts,
@@ -329,7 +322,7 @@ def _compared_groups(material: ReportData) -> list[dict[str, Any]]:
             reference = comparison.second.variant
             here = _only(group, variant, reference)
             there = _only(group, reference, variant)
-            material.context.notes.statements.append(
+            notes.statements.append(
                 f"Resonances in {variant} and not in {reference} ({group.title}): {here}. In {reference} and not in "
                 f"{variant}: {there}."
             )
@@ -472,7 +465,7 @@ def _study(study: StoredStudy) -> dict[str, object]:
     return {
         "title": study.title,
         "fits": study.fits,
-        "words": f"{study.points} points{lost}. {study.description[:1].upper()}{study.description[1:]}",
+        "words": f"{study.points} points{lost}. {capitalised(study.description)}",
         "pictures": [
             (png_address(path.read_bytes()), path.stem.replace("_", " "))
             for path in study.pictures

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -20,11 +20,11 @@ from exugear.report.findings.context import Context, model_label, response_label
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.headline import Headline
 from exugear.report.findings.ranking import HOUSING, SHAFTS, Ranking, Resonance, is_over_speed
-from exugear.report.findings.resonance_list import ListedResonance
-from exugear.report.findings.words import QUANTITIES, figure_text, percentages, rounded_text
+from exugear.report.findings.resonance_list import ListedResonance, listed_resonance
+from exugear.report.findings.words import QUANTITIES, capitalised, figure_text, percentages, rounded_text
 from exugear.report.pictures.speed_diagrams import NUMBERED, campbell_drawing
 from exugear.report.sections.material import ChartAxis, Curve, Part, ReportData, model_name
-from exugear.report.sections.measured import measured_run_ups
+from exugear.report.sections.measured import measured_run_up
 from exugear.report.sections.run_data import is_found_always
 from exugear.report.sections.sound import sound_power
 from exugear.report.web.html import Cell, Figure, Table, render
@@ -60,12 +60,25 @@ def resonances_section(material: ReportData) -> Part:
         listed = [_of_estimate(material, headline)]
     modes = [(model_name(model), _all_modes(material, model, data)) for model, data in material.results.modes.items()]
     responses = [_response(material, data) for data in material.results.steady]
-    measured = measured_run_ups(material)
+    measured = [measured_run_up(material, data) for data in material.results.measured]
     if not (listed or modes or responses or measured):
         return Part()
-    _note_growth(material)
+    for model, data in material.results.modes.items():
+        growth = float(data.attrs["growth_rate"])
+        if growth > 0.0:
+            unstable = f"{model_label(model)}: unstable, disturbances grow at up to {growth:.3g} 1/s."
+            material.context.notes.statements.append(unstable)
     groups = material.groups
-    words = _groups_text(groups) if groups else ""
+    words = ""
+    if groups:
+        first = groups[0]
+        highest = [own for own in first.ranked[first.main] if own.steady][:3]
+        entries = "; ".join(
+            f"{own.frequency:.0f} Hz at {own.speed / RPM:.1f} rpm, {figure_text(own.ranking_level)} dB"
+            for own in highest
+        )
+        named = f"Highest transmission errors at all speeds, {Variant.of(first.main).label}, {first.source}"
+        words = f"{named}: {entries or 'none found'}."
     html = render(
         "resonances",
         listed=listed,
@@ -87,16 +100,6 @@ def resonances_section(material: ReportData) -> Part:
     return Part(html, material.run_data, "Resonances", "ranking")
 
 
-def _groups_text(groups: Sequence[RunGroup]) -> str:
-    group = groups[0]
-    loudest = [own for own in group.ranked[group.main] if own.steady][:3]
-    entries = [
-        f"{own.frequency:.0f} Hz at {own.speed / RPM:.1f} rpm, {figure_text(own.ranking_level)} dB" for own in loudest
-    ]
-    named = f"Highest transmission errors at all speeds, {Variant.of(group.main).label}, {group.source}"
-    return f"{named}: {'; '.join(entries) or 'none found'}."
-
-
 # The list: a table for each variant of a result group, of which scripts show the selected one
 
 
@@ -105,9 +108,10 @@ def _of_group(material: ReportData, group: RunGroup, variant: str) -> dict[str, 
     ranking = group.rankings[variant]
     leads = material.headline is not None and group is material.headline.group and variant == group.main
     prefix = f"resonance:{group.name}:{variant}:"
-    rows = _run_rows(material, group, variant, listed)
     if group.responses:
         rows = _response_rows(material, ranking, listed, group, variant)
+    else:
+        rows = _run_rows(material, group, variant, listed)
     title = f"{Variant.of(variant).label.capitalize()}, inertia set {group.inertias}, {group.source}"
     table = _table(
         rows, listed, f"Resonances, {title}", "resonances" if leads else f"resonances-{group.name}-{variant}"
@@ -129,14 +133,7 @@ def _of_group(material: ReportData, group: RunGroup, variant: str) -> dict[str, 
 def _of_estimate(material: ReportData, headline: Headline) -> dict[str, Any]:
     """Return the list of an estimate from modes and static transmission errors."""
     ranking = headline.ranking
-    listed = []
-    for own in ranking.resonances[: 2 * SHOWN]:
-        found = headline.mode_of(own)
-        level = 20.0 * math.log10(max(own.amplitudes["error"].amplitude, 1e-12) / 1e-6)
-        mode = None if found is None else found.index
-        listed.append(
-            ListedResonance(OrderLine(own.line, own.order), abs(own.speed), own.frequency, level, True, mode, own)
-        )
+    listed = [listed_resonance(headline, own) for own in ranking.resonances[: 2 * SHOWN]]
     return {
         "group": None,
         "variant": None,
@@ -232,8 +229,6 @@ def _response_rows(
 def _run_rows(
     material: ReportData, group: RunGroup, variant: str, listed: Sequence[ListedResonance]
 ) -> list[dict[str, object]]:
-    if group.responses:
-        return []
     rows = []
     for number, own in enumerate(listed, start=1):
         found = own.peak
@@ -258,7 +253,7 @@ def _run_rows(
 
 
 def _first_cells(material: ReportData, number: int, own: ListedResonance) -> dict[str, object]:
-    rated = material.context.gearbox.case.operation.rated_speed_rpm
+    rated = material.rated_rpm
     rpm = own.speed / RPM
     row: dict[str, object] = {
         "No.": Cell(str(number), number, tag="rank"),
@@ -311,17 +306,20 @@ def _drawn(
     if not inside:
         return {**evaluated, "campbell": []}
     drawn = tuple(Resonance(own.line.name, own.line.order, own.speed, own.frequency, {}) for own in inside)
-    matched = {number: own.mode for number, own in enumerate(inside, start=1) if own.mode is not None}
-    frequencies = np.zeros(0) if modes is None else modes["frequency"].to_numpy()
+    frequencies = np.zeros(0)
+    matched: dict[int, int] = {}
+    if modes is not None:
+        frequencies = modes["frequency"].to_numpy()
+        matched = {number: own.mode for number, own in enumerate(inside, start=1) if own.mode is not None}
     # One line for each mesh, and those of the circles.
     single = [line for line in material.lines if " × " not in line.name]
     orders = {round(line.order, 6): line for line in [*(own.line for own in inside), *single]}
     lines = [(line, material.words.line(line)) for _, line in sorted(orders.items())]
-    rated = material.context.gearbox.case.operation.rated_speed_rpm
     words = "Orders are lines through the origin, modes are horizontal lines; circles have the numbers of the list."
     shown = replace(ranking, resonances=drawn)
-    known = matched if modes is not None else {}
-    drawings = [campbell_drawing(shown, lines, frequencies, known, rated, size, words) for size in CAMPBELL]
+    drawings = [
+        campbell_drawing(shown, lines, frequencies, matched, material.rated_rpm, size, words) for size in CAMPBELL
+    ]
     return {**evaluated, "campbell": drawings}
 
 
@@ -353,14 +351,6 @@ def _all_modes(material: ReportData, model: Choice, data: xr.Dataset) -> Table:
     )
 
 
-def _note_growth(material: ReportData) -> None:
-    for model, data in material.results.modes.items():
-        growth = float(data.attrs["growth_rate"])
-        if growth > 0.0:
-            unstable = f"{model_label(model)}: unstable, disturbances grow at up to {growth:.3g} 1/s."
-            material.context.notes.statements.append(unstable)
-
-
 # Further results of each steady-state response
 
 PEAKS = 20
@@ -385,13 +375,15 @@ SAME_SPEED = 0.02
 def _response(material: ReportData, data: xr.Dataset) -> dict[str, Any]:
     context = material.context
     choice = choice_of(data.attrs)
-    level = str(data.attrs["method"])
     runs = [run for run in material.results.runs if choice_of(run.attributes) == choice]
     label = response_label(data)
     context.tell(f"steady-state response, {label}")
-    found = peaks(data)[:PEAKS]
-    rates = {str(run.attributes["load_case"]): _unit_rate(run) for run in runs}
-    rows = [_row(material, peak, data, rates) for peak in found]
+    found = peaks(data)
+    rates = {}
+    for run in runs:
+        stored, _ = read_run(run.path, ("time", "input_speed"))
+        rates[str(run.attributes["load_case"])] = sweep_rate(stored["time"], stored["input_speed"], 1.0)
+    rows = [_row(material, peak, data, rates) for peak in found[:PEAKS]]
     lost = [row for row in rows if any(value == TOO_FAST for value in row.values())]
     warnings = [
         f"the run-up of the load case {run.attributes['load_case']} has another load ({run.attributes['load']}), which "
@@ -404,12 +396,12 @@ def _response(material: ReportData, data: xr.Dataset) -> dict[str, Any]:
             f"run-ups are too fast for {len(lost)} of the {len(rows)} highest peaks and underestimate them."
         )
     context.notes.statements.extend(f"Steady-state response, {label}: {warning}" for warning in warnings)
-    name = f"{level}-{model_name(choice)}"
+    name = f"{data.attrs['method']}-{model_name(choice)}"
     # Responses over speed are in the list and in the diagrams; continuations turn back and have their own.
     apart = not is_over_speed(data)
     return {
         "model": model_name(choice),
-        "title": label[0].upper() + label[1:],
+        "title": capitalised(label),
         "load": static_load_in_words(context.gearbox),
         "warnings": warnings,
         "growth": float(data.attrs["growth_rate"]),
@@ -429,11 +421,8 @@ def _response(material: ReportData, data: xr.Dataset) -> dict[str, Any]:
         "contributions": _contributions_table(material, data, f"made-by-{name}"),
         "campbell": _campbell(material, data, f"campbell-{name}", label),
         "sound": sound_power(material, data, f"sound-{name}"),
-        "ranges": [
-            f"{load_case}: {slow / RPM:.4g} to {fast / RPM:.4g} rpm"
-            for load_case, (slow, fast) in _ranges(context).items()
-        ],
-        "sidebands": Table(_sidebands(material, data, peaks(data)), ("sideband", "cause"), name=f"sidebands-{name}"),
+        "ranges": list(_ranges(context)),
+        "sidebands": Table(_sidebands(material, data, found), ("sideband", "cause"), name=f"sidebands-{name}"),
         "passages": material.words.labelled(_passages(context, _carriers(context))),
     }
 
@@ -462,7 +451,7 @@ def _order_charts(material: ReportData, data: xr.Dataset, runs: Sequence[Variant
             [ChartAxis(f"{material.input_words} speed / rpm"), ChartAxis("level / dB re 1 µm")],
         )
         for number, line in enumerate(order_lines(material.context.gearbox, 2))
-        if _place(data, line) is not None
+        if line.place(data["order"].to_numpy()) is not None
     ]
 
 
@@ -536,9 +525,8 @@ def _campbell(material: ReportData, data: xr.Dataset, name: str, label: str) -> 
     return figure, Table(rows, texts, caption=caption, name=f"{name}-modes", sortable=True)
 
 
-def _ranges(context: Context) -> dict[str, tuple[float, float]]:
-    """Return the absolute input speed range of each load case, rad/s."""
-    ranges = {}
+def _ranges(context: Context) -> Iterator[str]:
+    """Yield the range of absolute input speeds of each load case as text."""
     for name, case in context.gearbox.load_cases.items():
         try:
             loads = summarise_loads(context.gearbox, case)
@@ -546,8 +534,9 @@ def _ranges(context: Context) -> dict[str, tuple[float, float]]:
             context.notes.left_out.append(f"speeds of load case {name}: {error}")
             continue
         slowest = min(abs(loads.start_speed), abs(loads.end_speed))
-        ranges[name] = (0.0 if loads.start_speed * loads.end_speed < 0.0 else slowest, loads.fastest_speed)
-    return ranges
+        if loads.start_speed * loads.end_speed < 0.0:
+            slowest = 0.0
+        yield f"{name}: {slowest / RPM:.4g} to {loads.fastest_speed / RPM:.4g} rpm"
 
 
 def _mode_rows(
@@ -600,6 +589,9 @@ def _sidebands(material: ReportData, data: xr.Dataset, found: Sequence[Peak]) ->
     for peak in list(loudest.values())[:SIDEBAND_PEAKS]:
         bands = (*sidebands(data, peak)[:SHOWN_SIDEBANDS], *planet_sidebands(data, peak, carriers)[:SHOWN_SIDEBANDS])
         for band in bands:
+            amplitude = f"{1e6 * band.amplitude:.3g} µm"
+            if band.line.startswith("mesh_force "):
+                amplitude = f"{band.amplitude:.3g} N"
             rows.append(
                 {
                     "peak": f"{labelled(peak.line)} at {abs(peak.speed) / RPM:.1f} rpm",
@@ -607,7 +599,7 @@ def _sidebands(material: ReportData, data: xr.Dataset, found: Sequence[Peak]) ->
                     "sideband": labelled(band.line.replace("mesh_force ", "force of mesh ")),
                     "at / Hz": f"{band.frequency:.1f}",
                     "offset / Hz": f"{band.frequency - peak.frequency:+.2f}",
-                    "amplitude": _amplitude(band.line, band.amplitude),
+                    "amplitude": amplitude,
                     "fraction / %": f"{100.0 * band.share:.1f}",
                     "cause": labelled(band.cause),
                 }
@@ -630,10 +622,6 @@ def _passages(context: Context, carriers: Mapping[str, tuple[str, float]]) -> st
     return " ".join(entries)
 
 
-def _amplitude(line: str, amplitude: float) -> str:
-    return f"{amplitude:.3g} N" if line.startswith("mesh_force ") else f"{1e6 * amplitude:.3g} µm"
-
-
 def _carriers(context: Context) -> dict[str, tuple[str, float]]:
     """Return the carrier of the planets of each mesh family, and its revolutions per revolution of the input."""
     gearbox = context.gearbox
@@ -642,15 +630,8 @@ def _carriers(context: Context) -> dict[str, tuple[str, float]]:
     return {family: (frame, speeds[frame]) for family, frame in own.items() if speeds.get(frame)}
 
 
-def _place(data: xr.Dataset, line: OrderLine) -> int | None:
-    """Return the index of an order among the spectral components of a response."""
-    order = data["order"].to_numpy()
-    index = int(np.argmin(np.abs(order - line.order)))
-    return index if abs(order[index] - line.order) < 1e-6 * line.order else None
-
-
 def _curves(data: xr.Dataset, runs: Sequence[VariantRun], line: OrderLine) -> list[Curve]:
-    place = _place(data, line)
+    place = line.place(data["order"].to_numpy())
     amplitude = data["amplitude"].to_numpy()[:, place, 0].astype(np.float64)
     speed = np.abs(data["speed"].to_numpy()) / RPM
     level = _level(amplitude)
@@ -696,14 +677,16 @@ def _level(amplitude: Floats) -> Floats:
     return np.asarray(20.0 * np.log10(np.maximum(amplitude / 1e-6, 1e-6)))
 
 
-def _unit_rate(run: VariantRun) -> float:
-    """Return the sweep rate of order one in a run, Hz/s."""
-    stored, _ = read_run(run.path, ("time", "input_speed"))
-    return sweep_rate(stored["time"], stored["input_speed"], 1.0)
-
-
-def _row(material: ReportData, peak: Peak, data: xr.Dataset, rates: dict[str, float]) -> dict[str, object]:
-    damping = _damping(peak, data)
+def _row(material: ReportData, peak: Peak, data: xr.Dataset, rates: Mapping[str, float]) -> dict[str, object]:
+    orders = data["order"].to_numpy()
+    # Damping of the mode that the order of the peak crosses there, if known
+    near = [
+        (abs(crossing["speed"] - peak.speed), float(crossing["damping"]))
+        for crossing in json.loads(data.attrs["crossings"])
+        if abs(orders[crossing["line"]] - peak.order) < 1e-9 * peak.order
+        and abs(crossing["speed"] - peak.speed) < SAME_SPEED * abs(peak.speed)
+    ]
+    damping = min(near)[1] if near else None
     row: dict[str, object] = {
         "order": material.words.labelled(peak.line),
         "speed / rpm": f"{abs(peak.speed) / RPM:.2f}",
@@ -718,15 +701,3 @@ def _row(material: ReportData, peak: Peak, data: xr.Dataset, rates: dict[str, fl
             said = TOO_FAST if too_fast else "slow enough"
         row[f"run-up {load_case}"] = said
     return row
-
-
-def _damping(peak: Peak, data: xr.Dataset) -> float | None:
-    """Return the damping of the mode that the order of a peak crosses there, if known."""
-    orders = data["order"].to_numpy()
-    near = [
-        (abs(crossing["speed"] - peak.speed), float(crossing["damping"]))
-        for crossing in json.loads(data.attrs["crossings"])
-        if abs(orders[crossing["line"]] - peak.order) < 1e-9 * peak.order
-        and abs(crossing["speed"] - peak.speed) < SAME_SPEED * abs(peak.speed)
-    ]
-    return min(near)[1] if near else None

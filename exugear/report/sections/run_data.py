@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -20,8 +21,8 @@ from exugear.report.findings.words import QUANTITIES, figure_text, percentages, 
 from exugear.report.sections.material import ReportData, model_name, source_words
 from exugear.report.web.document import rounded
 from exugear.report.web.stage import stage_data
-from exugear.results.spectra.run_spectra import VariantRun, report_mode
-from exugear.results.spectra.waterfall import OrderLine, Waterfall
+from exugear.results.spectra.run_spectra import ModeReport, VariantRun, report_mode
+from exugear.results.spectra.waterfall import Waterfall
 from fe_ste.tools.arrays import Floats
 
 if TYPE_CHECKING:
@@ -135,22 +136,23 @@ ALSO = 4
 def run_data(material: ReportData) -> dict[str, Any]:
     """Return the script data of all run-ups, steady-state responses and modes: ``lines``, ``groups``, ``models``."""
     modes = material.results.modes
+    lines = []
+    for line in material.lines:
+        number, _, family = line.name.rpartition(" × ")
+        lines.append(
+            {
+                "name": line.name,
+                "short": material.words.line(line),
+                "sentence": material.words.line_sentence(line),
+                "order": line.order,
+                "harmonic": int(number) if number else 1,
+                "family": family,
+            }
+        )
     return {
-        "lines": [_line(material, line) for line in material.lines],
+        "lines": lines,
         "groups": [_group(material, group) for group in material.groups],
         "models": {model_name(model): _model(material, model, data) for model, data in modes.items()},
-    }
-
-
-def _line(material: ReportData, line: OrderLine) -> dict[str, Any]:
-    number, _, family = line.name.rpartition(" × ")
-    return {
-        "name": line.name,
-        "short": material.words.line(line),
-        "sentence": material.words.line_sentence(line),
-        "order": line.order,
-        "harmonic": int(number) if number else 1,
-        "family": family,
     }
 
 
@@ -378,7 +380,7 @@ def _model(material: ReportData, model: Choice, data: xr.Dataset) -> dict[str, A
         "words": model_label(model),
         "variant": model.variant,
         "stage": stage_data(
-            assembly, data["shape"].to_numpy(), labels, material.arrays, _deformed(material, model, data)
+            assembly, data["shape"].to_numpy(), labels, material.arrays, _deformed(material, model, reports)
         ),
         "modes": [
             {
@@ -391,7 +393,8 @@ def _model(material: ReportData, model: Choice, data: xr.Dataset) -> dict[str, A
     }
 
 
-def _deformed(material: ReportData, model: Choice, data: xr.Dataset) -> set[int]:
+def _deformed(material: ReportData, model: Choice, reports: Sequence[ModeReport]) -> set[int]:
+    """Return the modes in which flexible bodies deform."""
     if not model.variant.is_elastic:
         return set()
     matched = {
@@ -401,7 +404,6 @@ def _deformed(material: ReportData, model: Choice, data: xr.Dataset) -> set[int]
         for own in material.lists[group.name, model.variant]
         if own.mode is not None
     }
-    reports = [report_mode(data, index) for index in range(data.sizes["mode"])]
     seen = sorted((report for report in reports if report.share >= VISIBLE_SHARE), key=lambda one: -one.amplification)
     most = [*sorted(matched), *(one.index for one in seen if one.index not in matched)]
     return set(most[: max(DEFORMED, len(matched))])

@@ -1,6 +1,7 @@
 """Whole web page in one file that runs only its own scripts and makes no network requests.
 
-`benchmarks` and tests need no Node.js; ``web/vendor.mjs`` of the repository updates the vendored files from npm.
+The libraries in it are files of the repository, so that tests and benchmarks need no Node.js; ``web/vendor.mjs``
+updates them from npm.
 
 A page opened from a file cannot import modules. Each module therefore becomes a function that is called once and
 returns its exports; imports become constants from the results of earlier modules. Nothing else is changed.

@@ -16,10 +16,9 @@ SHORT_TEXT, LONG_TEXT = 8, 40
 
 @cache
 def _environment() -> Environment:
-    loader = PackageLoader("exugear.report.web")
     return Environment(
         autoescape=True,
-        loader=loader,
+        loader=PackageLoader("exugear.report.web"),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

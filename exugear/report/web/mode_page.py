@@ -140,9 +140,7 @@ def write_mode_page(
     vibrations = np.column_stack([shapes, *(row.shape for row in resonances)])
     shown: list[ModeRow | ResonanceRow] = [*rows, *resonances]
     near = sorted(range(len(shown)), key=lambda place: (place < len(rows), abs(place - first)))
-    deformed = near[:MOST_DEFORMED]
-    if not assembly.elastic_bodies:
-        deformed = []
+    deformed = near[:MOST_DEFORMED] if assembly.elastic_bodies else []
     data: dict[str, Any] = {
         "name": heading,
         **NO_RESULTS,

@@ -16,11 +16,10 @@ from exugear.report.pictures.scene import DISPLACEMENT_COLOURS, body_colours
 from exugear.report.pictures.shapes import (
     BodyShape,
     TriangleSurface,
-    blank_discs,
     bodies_of,
-    gear_surface,
     largest_displacement,
     motions_of,
+    shapes_at_seats,
     turned,
     vibration_of,
 )
@@ -57,12 +56,11 @@ def drawn_bodies(assembly: Assembly) -> tuple[DrawnBody, ...]:
 
 def rigid_bodies(gearbox: Gearbox) -> tuple[DrawnBody, ...]:
     """List all bodies of a gearbox that have a shape to draw, as rigid ones."""
+    from matplotlib.colors import to_hex
+
     shapes = bodies_of(gearbox)
     colours = body_colours(shapes)
-    return tuple(
-        DrawnBody(shape, "#" + "".join(f"{round(255 * channel):02x}" for channel in colours[shape.family]), shape.name)
-        for shape in shapes
-    )
+    return tuple(DrawnBody(shape, to_hex(colours[shape.family]), shape.name) for shape in shapes)
 
 
 def _elastic(assembly: Assembly, colours: dict[str, str]) -> list[DrawnBody]:
@@ -79,13 +77,7 @@ def _elastic(assembly: Assembly, colours: dict[str, str]) -> list[DrawnBody]:
         shape = BodyShape(body.name, body.family, TriangleSurface(surface.points, triangles), centre, body.fixed)
         colour = colours.get(body.family, "#a0a8b0")
         drawn.append(DrawnBody(shape, colour, body.name, surface.displacement))
-        for gear, z in {} if body.fixed else body.wheels.items():
-            place = np.array([*body.axis, z])
-            teeth = gear_surface(assembly.gearbox.gears[gear]).moved(place)
-            drawn.append(DrawnBody(BodyShape(gear, gear, teeth, place), colour, body.name))
-        for seat, (z, disc) in blank_discs(assembly.gearbox, body).items():
-            place = np.array([*body.axis, z])
-            drawn.append(DrawnBody(BodyShape(seat, seat, disc, place), colour, body.name))
+        drawn += [DrawnBody(seated, colour, body.name) for seated in shapes_at_seats(assembly.gearbox, body)]
     return drawn
 
 
@@ -198,8 +190,35 @@ def bodies_data(bodies: tuple[DrawnBody, ...], labels: Mapping[str, str], arrays
     # A rotor with given inertias only has no shape to draw; the view is then empty.
     points = np.concatenate([np.zeros((0, 3)), *(body.shape.surface.points for body in bodies)])
     low, high = (points.min(axis=0), points.max(axis=0)) if bodies else (np.zeros(3), np.ones(3))
+    firsts: dict[str, DrawnBody] = {}
+    listed = []
+    for body in bodies:
+        # Each shape is stored once, with points in 16 bits of its bounding box: 15 µm per metre.
+        first = firsts.setdefault(body.shape.family, body)
+        turn = turn_between(first.shape, body.shape)
+        drawn = body if turn is None else first
+        local = drawn.shape.surface.points - drawn.shape.reference
+        start = local.min(axis=0)
+        span = np.maximum(np.ptp(local, axis=0), 1e-9)
+        kind = "u2" if len(local) <= _U16 else "u4"
+        listed.append(
+            {
+                "name": body.shape.name,
+                "label": labels.get(body.shape.name, body.shape.name),
+                "owner": body.owner,
+                "fixed": body.shape.fixed,
+                "elastic": body.field is not None,
+                "colour": body.colour,
+                "reference": rounded_list(body.shape.reference, 7),
+                "turn": rounded(turn or 0.0, 8),
+                "low": rounded_list(start, 7),
+                "span": rounded_list(span, 7),
+                "points": arrays.add(np.round((local - start) / span * _U16).astype("u2"), differences=True),
+                "triangles": arrays.add(drawn.shape.surface.triangles.astype(kind), differences=True),
+            }
+        )
     return {
-        "bodies": _bodies(bodies, labels, arrays),
+        "bodies": listed,
         "centre": rounded_list(0.5 * (low + high), 6),
         "diagonal": rounded(float(np.linalg.norm(high - low)), 6),
         "amplitude": LARGEST,
@@ -233,35 +252,3 @@ def motions_data(
 def _parts(amplitudes: Complexes) -> Floats:
     """Return real and imaginary parts along a new first axis."""
     return np.stack([amplitudes.real, amplitudes.imag])
-
-
-def _bodies(bodies: tuple[DrawnBody, ...], labels: Mapping[str, str], arrays: ArrayStore) -> list[dict[str, Any]]:
-    """Return each shape once, with points in 16 bits of its bounding box: 15 µm per metre."""
-    firsts: dict[str, DrawnBody] = {}
-    listed = []
-    for body in bodies:
-        first = firsts.setdefault(body.shape.family, body)
-        turn = turn_between(first.shape, body.shape)
-        drawn = body if turn is None else first
-        local = drawn.shape.surface.points - drawn.shape.reference
-        low = local.min(axis=0)
-        span = np.maximum(np.ptp(local, axis=0), 1e-9)
-        triangles = drawn.shape.surface.triangles
-        kind = "u2" if len(local) <= _U16 else "u4"
-        listed.append(
-            {
-                "name": body.shape.name,
-                "label": labels.get(body.shape.name, body.shape.name),
-                "owner": body.owner,
-                "fixed": body.shape.fixed,
-                "elastic": body.field is not None,
-                "colour": body.colour,
-                "reference": rounded_list(body.shape.reference, 7),
-                "turn": rounded(turn or 0.0, 8),
-                "low": rounded_list(low, 7),
-                "span": rounded_list(span, 7),
-                "points": arrays.add(np.round((local - low) / span * _U16).astype("u2"), differences=True),
-                "triangles": arrays.add(triangles.astype(kind), differences=True),
-            }
-        )
-    return listed
