@@ -232,8 +232,8 @@ def _excitation(data: xr.Dataset) -> Iterator[Finding]:
     harmonics = int(data.attrs["harmonics"])
     change = float(data.attrs["change_with_more"])
     if math.isfinite(change):
-        text = f"{harmonics} mesh harmonics ({math.ceil(1.5 * harmonics)} would change the ten highest peaks by at "
-        text += f"most {100.0 * change:.1g} %)"
+        text = f"{harmonics} mesh harmonics ({math.ceil(1.5 * harmonics)}, and 1.5 times as many combinations of "
+        text += f"meshes, would change the ten highest peaks by at most {100.0 * change:.1g} %)"
         yield Finding("warning" if change > NOTICED_CHANGE else "note", text, change)
     else:
         yield Finding("note", f"{harmonics} mesh harmonics; harmonics that a solution requires are added")

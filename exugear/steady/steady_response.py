@@ -245,8 +245,8 @@ class SteadyResponse(ReprMixin):
     left_out: Floats
     """(waves,) share of the variation of each mesh's compliance that is above them."""
     change_with_more: float
-    """Largest relative change of the ten highest peaks with 1.5 times as many harmonics; NaN where each state has as
-    many orders as it needs."""
+    """Largest relative change of the ten highest peaks with 1.5 times as many harmonics and combinations; NaN where
+    each state has as many orders as it needs."""
     band: DampingBand
     """How high the highest peaks are with the lowest and the highest plausible damping."""
     shafts: int
@@ -288,7 +288,7 @@ class SteadyResponse(ReprMixin):
 
 
 CHECKED, MORE = 10, 1.5
-"""Number of highest peaks that are recomputed, and the factor on the number of harmonics."""
+"""Number of highest peaks that are recomputed, and the factor on the numbers of harmonics and combinations."""
 PEAKS_WITH_CONTRIBUTIONS = 20
 """Crossings whose peaks are taken apart."""
 LINES_WITH_CONTRIBUTIONS = 5
@@ -509,7 +509,7 @@ def _solve_from(
 
 
 def _change_with_more(solver: PointSolver, solved: SolvedPoints) -> float:
-    """Return the largest relative change of the highest peaks of the transmission error with more harmonics.
+    """Return the largest relative change of the highest peaks of the transmission error with more orders.
 
     Peaks at which the method `nonlinear` finds no state from rest are left out.
     """
@@ -518,7 +518,7 @@ def _change_with_more(solver: PointSolver, solved: SolvedPoints) -> float:
         return math.nan
     if not model.waves.varies:
         return 0.0
-    other = PointSolver(solver.linear.with_harmonics(math.ceil(MORE * model.usual_harmonics)), solver.method)
+    other = PointSolver(solver.linear.with_more(MORE), solver.method)
     values: Floats = np.abs(solved.amplitude[:, :, 0].astype(np.complex128))
     found = []
     for line in range(1, values.shape[1]):

@@ -357,17 +357,16 @@ class HarmonicBalanceModel:
         """Harmonics of each mesh frequency among its usual lines."""
         return self._usual.harmonics // 2
 
-    def with_harmonics(self, harmonics: int) -> HarmonicBalanceModel:
-        """Copy with the usual lines of other harmonics of each mesh frequency."""
+    def with_more(self, factor: float) -> HarmonicBalanceModel:
+        """Copy with a factor times the usual harmonics of each mesh frequency and combinations of several."""
         other = self._copied()
-        combinations = self._usual.combinations
+        harmonics = math.ceil(factor * self.usual_harmonics)
+        combinations = math.ceil(factor * (self._usual.combinations // 2))
         other.harmonics, other._least, other._larger = 2 * harmonics, 0, None
-        other._usual = other._reach = HarmonicTruncation(2 * harmonics, combinations)
-        if self.waves.neighbours:  # those beside the known lines are known to be needed
-            more = self._lines_within(HarmonicTruncation(harmonics, combinations // 2), neighbours=0)
-            other.lines = joined(self.lines, more)
-            return other
-        other.lines = self._lines_within(HarmonicTruncation(harmonics, combinations // 2))
+        other._usual = other._reach = HarmonicTruncation(2 * harmonics, 2 * combinations)
+        # Neighbours of known lines are known to be needed; those of others are not looked for.
+        more = other._lines_within(HarmonicTruncation(harmonics, combinations), neighbours=0)
+        other.lines = joined(self.lines, more) if self.waves.neighbours else more
         return other
 
     @cached_property

@@ -23,6 +23,8 @@ CARRIED = (1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
 Near a resonance of a damping ratio z what is left out counts by a factor of 1 / 2 z."""
 CHANGED = 5e-4
 """Relative change by the lines left out, of all others together, with which a choice is good enough."""
+FORCES_CHANGED = 2e-3
+"""The same of the forces of the meshes, in which what passing planets do, most of a deflection, hardly counts."""
 EVEN, AT_CROSSINGS = 3, 8
 """Speeds at which lines are judged: some even ones, and those of the strongest crossings of orders with modes."""
 
@@ -52,28 +54,37 @@ def with_needed_neighbours(
     """
     beside = model.beside_others & np.delete(model.lines.index, model.varying[0].carrier, axis=1).any(axis=1)
     whole = _vibrations(model, speeds, prepared)
-    shares = np.array([np.linalg.norm(values[:, 1:], axis=1) for values in whole])
-    shares /= np.linalg.norm(shares[:, 1:], axis=1)[:, None]
+    carry = np.array([np.linalg.norm(motion[:, 1:], axis=1) for motion, _ in whole])
+    push = np.array([np.linalg.norm(forces, axis=1) for _, forces in whole])
+    shares, pushing = (own.T / np.linalg.norm(own[:, 1:], axis=1) for own in (carry, push))
+    # Of forces, as much more may be left out as they may change more.
+    shares = np.maximum(shares, CHANGED / FORCES_CHANGED * pushing).max(axis=1)
     few, changed = model, 0.0
     for carried in CARRIED:
-        kept = ~beside | (shares.max(axis=0) > carried)
+        kept = ~beside | (shares > carried)
         few = model.of(kept)
         chosen = _vibrations(few, speeds, prepared)
-        changed = max(_change(found, values[kept]) for found, values in zip(chosen, whole, strict=True))
-        if changed < CHANGED:
+        pairs = list(zip(chosen, whole, strict=True))
+        parts = (slice(0, 1), slice(1, None))
+        changed = max(_change(found[:, part], known[kept, part]) for (found, _), (known, _) in pairs for part in parts)
+        of_forces = max(_change(found, known[kept]) for (_, found), (_, known) in pairs)
+        if changed < CHANGED and of_forces < FORCES_CHANGED:
             break
     return few, changed
 
 
-def _vibrations(model: HarmonicBalanceModel, speeds: Floats, prepared: Steps | None) -> list[Complexes]:
+def _vibrations(
+    model: HarmonicBalanceModel, speeds: Floats, prepared: Steps | None
+) -> list[tuple[Complexes, Complexes]]:
     """Vibration at each of the speeds (rad/s), two at a time."""
 
-    def vibration(speed: float) -> Complexes:
-        """Overall transmission error and deflections of the meshes (n, 1 + m), m."""
+    def vibration(speed: float) -> tuple[Complexes, Complexes]:
+        """Overall transmission error and deflections of the meshes (n, 1 + m), m; their forces (n, m), N."""
         response = parametric_response(model, model.at(speed))
-        return np.column_stack([response.motion @ model.row_of_overall(speed), response.deflection])
+        overall = response.motion @ model.row_of_overall(speed)
+        return np.column_stack([overall, response.deflection]), response.force
 
-    found: list[Complexes] = []
+    found: list[tuple[Complexes, Complexes]] = []
     while len(found) < len(speeds):
         found += side_by_side(vibration, speeds[len(found) : len(found) + 2].tolist())
         if prepared is not None:
@@ -82,6 +93,5 @@ def _vibrations(model: HarmonicBalanceModel, speeds: Floats, prepared: Steps | N
 
 
 def _change(found: Complexes, known: Complexes) -> float:
-    """Change of the error, or of the deflections, in all lines but the mean, over their size; whichever is larger."""
-    parts = slice(0, 1), slice(1, None)
-    return max(float(np.linalg.norm((found - known)[1:, part]) / np.linalg.norm(known[1:, part])) for part in parts)
+    """Change of a vibration (n, k) in all lines but the mean, over its size."""
+    return float(np.linalg.norm((found - known)[1:]) / np.linalg.norm(known[1:]))

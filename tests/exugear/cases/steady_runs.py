@@ -13,6 +13,7 @@ from exugear.steady.balance.nonlinear import HarmonicResidual
 from exugear.steady.balance.response import signals
 from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
+from exugear.steady.settling import frame_coordinates
 from exugear.system.build import assemble
 from exugear.system.loads import LoadTable
 from exugear.transient.compiled.solver import CompiledSystem, Observer
@@ -184,7 +185,10 @@ def start_of(model, response):
 
 
 def whole_run(model, response, duration, step, torque, assembly=None, every=8):
-    """Instants, all signals, and coordinates of a run in time that starts on a response, every few steps; its observer."""
+    """Instants, all signals and coordinates of a run in time, every few steps, and its observer.
+
+    The run starts on a response.
+    """
     assembly = assembly or model.waves.assembly
     q, v = start_of(model, response)
     load = assembly.gearbox.case.static_load
@@ -297,45 +301,49 @@ def planets_apart_over_time(solver, speed, duration, step, last):
 
 
 def amplitudes_apart(solver, speed, duration, step, last):
-    """Differences of the amplitudes of all orders together between response and run, over their size, by quantity.
+    """Differences of amplitudes between response and run, of all signals of a quantity together, over their size.
 
-    Forces of meshes are those of the run, as waves of planets. Forces of bearings and accelerations of their seats
-    follow from the lines of its motion; what is less than a hundredth of the largest of a quantity is left out.
-
-    Returns
-    -------
-    mapping of quantity to (k, 2) differences and sizes of its signals, in the quantities' units
+    Forces of meshes are those of the run, of planets as waves. Forces of bearings and accelerations of their seats
+    follow from the lines of its motion. Orders count that have a hundredth of their signal or more: what a run has
+    elsewhere is noise, which accelerations of high orders multiply.
     """
     model = solver.model
+    system = model.system
     response = solver.response(speed)
     drive = drive_of(model, response)
     time, found, states, observer = whole_run(model, response, duration, step, drive, every=4)
     late = time > duration - last
-    mean, rolled = rolling(model, response, time[late], states[late, model.system.pinned])
+    mean, rolled = rolling(model, response, time[late], states[late, system.pinned])
     response = solver.response(mean)
     known = signals(model, response)
     names = [own.name for own in model.signal_names]
-    of_run = [frame_coordinates(model.system.frame, states[late], rolled) - model.system.static_at(mean)]
-    columns = [slice(0, model.system.size)]
-    places = []
+    of_run = [frame_coordinates(system.frame, states[late], rolled) - system.static_at(mean)]
+    of_meshes = []
     for meshes, planets in model.waves.groups:
         waves = [wave for wave in (model.waves.waves[n] for n in model.waves.force_waves) if wave.first == meshes[0]]
-        places += [names.index(f"mesh_force {wave.name}") for wave in waves]
+        of_meshes += [names.index(f"mesh_force {wave.name}") for wave in waves]
         elements = [model.waves.assembly.elements[mesh].mesh.name for mesh in meshes]
         forces = found[late][:, [column_of(observer, f"mesh_force {name}") for name in elements]]
-        of_run.append(forces if planets is None else _back(planets.values(planets.ratio * rolled), forces))
-    lines = lines_through(model, rolled, np.hstack(of_run), np.linalg.norm(response.motion, axis=1) > 0.0)
-    motion, of_meshes = lines[:, : model.system.size], lines[:, model.system.size :]
-    interface = response.interface
+        if planets is not None:
+            forces = np.linalg.solve(planets.values(planets.ratio * rolled), forces[..., None])[..., 0]
+        of_run.append(forces)
+    orders = model.lines.orders
+    seen = np.flatnonzero(abs(mean) * orders < np.pi / (time[1] - time[0]))
+    angles = np.outer(np.copysign(1.0, mean) * rolled, orders[seen])
+    columns = np.hstack([np.cos(angles), -np.sin(angles[:, 1:])])
+    fit = np.linalg.lstsq(columns, np.hstack(of_run), rcond=None)[0]
+    lines = np.zeros((len(orders), fit.shape[1]), dtype=complex)
+    lines[seen[0]] = fit[0]
+    lines[seen[1:]] = 0.5 * (fit[1 : len(seen)] + 1j * fit[len(seen) :])
     made = np.zeros_like(known)
-    of_motion = interface.rows.of(motion, interface.frequencies)
-    made[:, : of_motion.shape[1]] = of_motion
-    made[:, places] = of_meshes
+    rows = response.interface.rows
+    made[:, : len(rows.names)] = rows.of(lines[:, : system.size], response.interface.frequencies)
+    made[:, of_meshes] = lines[:, system.size :]
     apart_by = {}
     for quantity in ("overall_dte", "mesh_force", "support_force", "seat_acceleration"):
         own = [n for n, signal in enumerate(model.signal_names) if signal.quantity == quantity]
-        size = np.linalg.norm(known[1:, own], axis=0)
-        change = np.linalg.norm(np.abs(made[1:, own]) - np.abs(known[1:, own]), axis=0)
-        large = size > 0.01 * size.max()
-        apart_by[quantity] = np.column_stack([change, size])[large]
+        size = np.abs(known[seen[1:]][:, own])
+        counted = size > 0.01 * np.linalg.norm(size, axis=0)
+        change = (np.abs(made[seen[1:]][:, own]) - size)[counted]
+        apart_by[quantity] = float(np.linalg.norm(change) / np.linalg.norm(size))
     return apart_by
