@@ -232,8 +232,10 @@ def _excitation(data: xr.Dataset) -> Iterator[Finding]:
     harmonics = int(data.attrs["harmonics"])
     change = float(data.attrs["change_with_more"])
     if math.isfinite(change):
-        text = f"{harmonics} mesh harmonics ({math.ceil(1.5 * harmonics)}, and 1.5 times as many combinations of "
-        text += f"meshes, would change the ten highest peaks by at most {100.0 * change:.1g} %)"
+        combined = bool((np.count_nonzero(data["index"].to_numpy(), axis=1) > 1).any())
+        more = ", and 1.5 times as many combinations of meshes," if combined else ""
+        text = f"{harmonics} mesh harmonics ({math.ceil(1.5 * harmonics)}{more} would change the ten highest peaks by "
+        text += f"at most {100.0 * change:.1g} %)"
         yield Finding("warning" if change > NOTICED_CHANGE else "note", text, change)
     else:
         yield Finding("note", f"{harmonics} mesh harmonics; harmonics that a solution requires are added")

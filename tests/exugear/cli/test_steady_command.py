@@ -163,10 +163,7 @@ def test_harmonics_are_told_and_may_be_asked_for(case):
     assert summary["harmonics"] == 3
     assert summary["truncation_of_compliance"]["spur"] > usual["truncation_of_compliance"]["spur"]
     assert summary["change_with_more_harmonics"] > usual["change_with_more_harmonics"]
-    assert any(
-        own["text"].startswith("3 mesh harmonics (5, and 1.5 times as many combinations of meshes, would")
-        for own in summary["findings"]
-    )
+    assert any(own["text"].startswith("3 mesh harmonics (5 would change") for own in summary["findings"])
 
 
 @pytest.mark.parametrize(

@@ -203,6 +203,15 @@ def test_the_change_with_more_harmonics_is_that_of_the_loudest_peaks(parallel):
     assert abs(same / peaks[point, line] - 1.0) < few.change_with_more + 2e-2
 
 
+@pytest.mark.validation
+def test_the_change_with_more_orders_is_that_of_combinations_too(parallel):
+    """Two meshes that swing: without their combinations peaks are off by what more of them change."""
+    assembly = assemble(parallel.gearbox, BUSHING, {"stage_1": stiff(6e8, 0.2), "stage_2": stiff(9e8, 0.2)})
+    speeds = SpeedRange(30.0, 60.0, 20)
+    few, more = (response_of(assembly, SteadySettings(speeds, harmonics=10, combinations=n)) for n in (2, 6))
+    assert more.change_with_more < 0.1 * few.change_with_more
+
+
 @pytest.mark.parametrize("count", [0, 101])
 def test_harmonics_that_cannot_be_are_refused(count):
     with pytest.raises(SteadyError, match="must be from 1 to 100"):
