@@ -99,7 +99,7 @@ def follow_branch(
     Raises
     ------
     HarmonicBalanceError
-        No steady state was found at the first speed, or the branch was lost.
+        No steady state was found at the first speed, or beyond it.
     SteadyError
         Planets mesh out of phase.
     """
@@ -148,11 +148,17 @@ def follow_branch(
     if not found.whole:
         turns = [n for n, _ in found.folds]
         count = len(found.parameter)
+        reason = (
+            f"steps are short at grazing contact, with {len(turns)} turning points, "
+            f"{sum(n > count // 2 for n in turns)} of them in the second half; start at that speed"
+        )
+        if found.lost:
+            reason = (
+                "no steady state is found near the last point, where the branch may end or turn sharply; start beyond"
+            )
         ended = (
             f"the continuation ends at {found.parameter[-1] / RPM:.5g} rpm after {count} points, before "
-            f"{last / RPM:.5g} rpm: steps are short at grazing contact, with {len(turns)} turning points, "
-            f"{sum(n > count // 2 for n in turns)} of them in the second half; start at that speed, or remove "
-            "--continuation"
+            f"{last / RPM:.5g} rpm: {reason}, or remove --continuation"
         )
     return SteadyBranch(found.parameter, readings, np.array(growth), tuple(fold for _, fold in found.folds), ended)
 

@@ -59,7 +59,9 @@ class Branch:
     lines: Complexes
     """(n, ...)"""
     whole: bool = True
-    """Whether the branch reached its end value; else it stopped at the maximum number of points."""
+    """Whether the branch reached its end value; else it stopped at the maximum number of points, or is lost."""
+    lost: bool = False
+    """Whether no solution was found near its last point with steps a thousandth of the first."""
 
     @property
     def folds(self) -> tuple[tuple[int, float], ...]:
@@ -102,7 +104,7 @@ def trace(
     Raises
     ------
     HarmonicBalanceError
-        No solution at `first`, or none near the branch with steps a thousandth of the first.
+        No solution at `first`, or none beyond it.
     """
     solve = solve or (lambda change, right, tolerance: solve_lines(change, right, tolerance)[0])
     lines = [_solution_at(residual, solve, start, first, scales)]
@@ -111,16 +113,15 @@ def trace(
     length = step
     tangent_lines = np.zeros_like(start)
     tangent_parameter = sense * scales.parameter
-    whole = False
-    while not whole and len(parameters) < MOST_POINTS:
+    whole = lost = False
+    while not (whole or lost) and len(parameters) < MOST_POINTS:
         ahead = lines[-1] + length * tangent_lines, parameters[-1] + length * tangent_parameter
         found = _corrected(residual, solve, ahead, (tangent_lines, tangent_parameter), scales)
         if found is None:
             length *= 0.5
-            if length < 1e-3 * step:
-                raise HarmonicBalanceError(
-                    f"continuation: no solution near {parameters[-1]:.6g}; the branch may end or turn sharply"
-                )
+            lost = length < 1e-3 * step
+            if lost and len(parameters) == 1:
+                raise HarmonicBalanceError(f"continuation: no solution beyond the start {first:.6g}")
             continue
         y, p, corrections = found
         size = np.hypot(_size(y - lines[-1]) / scales.lines, (p - parameters[-1]) / scales.parameter)
@@ -132,7 +133,7 @@ def trace(
             progress(p)
         whole = bool((p - last) * sense >= 0.0 or (p - first) * sense < 0.0)
         length = min(longest, 1.5 * length) if corrections <= GOOD_CORRECTIONS else 0.7 * length
-    return Branch(np.array(parameters), np.array(lines), whole)
+    return Branch(np.array(parameters), np.array(lines), whole, lost)
 
 
 def _size(values: Complexes) -> float:

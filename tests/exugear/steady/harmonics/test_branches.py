@@ -140,3 +140,15 @@ def test_a_start_that_leads_nowhere_is_told():
 
     with pytest.raises(HarmonicBalanceError, match="continuation: no solution at the start 1"):
         trace(residual, np.zeros(2, dtype=complex), 1.0, 2.0, Scales(1.0, 1.0), step=0.1, longest=0.1)
+
+
+def test_a_branch_that_is_lost_is_kept_up_to_there():
+    def residual(x, parameter):
+        return x - parameter if parameter < 1.5 else np.full_like(x, np.nan), lambda step: step
+
+    found = trace(residual, np.ones(1, dtype=complex), 1.0, 2.0, Scales(1.0, 1.0), step=0.1, longest=0.1)
+    assert found.lost and not found.whole
+    assert 1.49 < found.parameter[-1] < 1.5
+    np.testing.assert_allclose(found.lines[:, 0], found.parameter, rtol=1e-6)
+    with pytest.raises(HarmonicBalanceError, match="no solution beyond the start 1.49999"):
+        trace(residual, np.ones(1, dtype=complex), 1.49999, 2.0, Scales(1.0, 1.0), step=0.1, longest=0.1)
