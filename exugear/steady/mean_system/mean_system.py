@@ -442,6 +442,13 @@ def _stiffness_at_rest(frame: RotatingFrame, psi: float, u: Floats) -> Floats:
     return np.asarray(t.T @ tangent_stiffness(frame.assembly, q, frame.mean_meshes) @ t)
 
 
+def _mean_stiffness(frame: RotatingFrame, places: Floats, speed: float, u: Floats) -> Floats:
+    """Mean stiffness (size, size) over angles of the input, rad; what the rotation adds is that of the first."""
+    first = _stiffness(frame, float(places[0]), speed, u)
+    at_rest = [_stiffness_at_rest(frame, float(psi), u) for psi in places] if len(places) > 1 else [np.zeros(1)]
+    return np.asarray(first + np.mean(at_rest, axis=0) - at_rest[0])
+
+
 def place_step(assembly: Assembly) -> float:
     """Step of central differences of forces by places, m and rad."""
     return ROWS_STEP if assembly.has_rows else PLACE_STEP
@@ -508,7 +515,7 @@ def _static(
         best = min(best, error)
         # The elements are all but linear: one matrix serves for several steps.
         if matrix is None or error > 0.1 * before:
-            matrix = np.asarray(np.mean([_stiffness_at_rest(frame, float(psi), u) for psi in places], axis=0))
+            matrix = _mean_stiffness(frame, places, speed, u)
         before = error
         bordered[:n, :n], bordered[:n, n], bordered[n, pinned] = matrix, -drive * largest, largest
         step = np.linalg.solve(bordered, -np.append(missing, largest * u[pinned]))
