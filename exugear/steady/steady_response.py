@@ -150,15 +150,13 @@ def follow_branch(
         count = len(found.parameter)
         reason = (
             f"steps are short at grazing contact, with {len(turns)} turning points, "
-            f"{sum(n > count // 2 for n in turns)} of them in the second half; start at that speed"
+            f"{sum(n > count // 2 for n in turns)} of them in the second half; start at that speed, or"
         )
         if found.lost:
-            reason = (
-                "no steady state is found near the last point, where the branch may end or turn sharply; start beyond"
-            )
+            reason = "no steady state is found near the last point, where the branch may end or turn sharply;"
         ended = (
             f"the continuation ends at {found.parameter[-1] / RPM:.5g} rpm after {count} points, before "
-            f"{last / RPM:.5g} rpm: {reason}, or remove --continuation"
+            f"{last / RPM:.5g} rpm: {reason} remove --continuation"
         )
     return SteadyBranch(found.parameter, readings, np.array(growth), tuple(fold for _, fold in found.folds), ended)
 

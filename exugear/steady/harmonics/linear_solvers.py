@@ -434,14 +434,18 @@ def invert(at: int, matrix: Floats) -> None:
 
 
 @kernel
-def take_out(k: int, i: int, entries: Integers, cases: int, plan: Elimination, matrix: Floats, out: Floats) -> None:
-    """Take step k, its diagonal inverted, out of the row of step i, whose entries (n,) are given by their columns."""
+def over_diagonal(k: int, a: Floats, b: Floats, plan: Elimination, matrix: Floats) -> tuple[Floats, Floats]:
+    """Divide eight numbers a + i b by the diagonal of step k, whose inverse stands there."""
     x = eight(matrix, 2 * SIZE * plan.diagonal[k])
     y = eight(matrix, 2 * SIZE * plan.diagonal[k] + SIZE)
-    a = eight(matrix, 2 * SIZE * entries[k])
-    b = eight(matrix, 2 * SIZE * entries[k] + SIZE)
-    factor = a * x - b * y
-    turned = a * y + b * x
+    return a * x - b * y, a * y + b * x
+
+
+@kernel
+def take_out(k: int, i: int, entries: Integers, cases: int, plan: Elimination, matrix: Floats, out: Floats) -> None:
+    """Take step k, its diagonal inverted, out of the row of step i, whose entries (n,) are given by their columns."""
+    at = 2 * SIZE * entries[k]
+    factor, turned = over_diagonal(k, eight(matrix, at), eight(matrix, at + SIZE), plan, matrix)
     for entry in range(plan.diagonal[k] + 1, plan.first[k + 1]):
         at = 2 * SIZE * entry
         to = 2 * SIZE * entries[plan.column[entry]]
@@ -461,12 +465,8 @@ def take_out(k: int, i: int, entries: Integers, cases: int, plan: Elimination, m
 @kernel
 def take_out_two(k: int, i: int, entries: Integers, cases: int, plan: Elimination, matrix: Floats, out: Floats) -> None:
     """Take steps k and k + 1, which touch the same later rows, out of the row of step i: it is passed once."""
-    x = eight(matrix, 2 * SIZE * plan.diagonal[k])
-    y = eight(matrix, 2 * SIZE * plan.diagonal[k] + SIZE)
-    a = eight(matrix, 2 * SIZE * entries[k])
-    b = eight(matrix, 2 * SIZE * entries[k] + SIZE)
-    factor = a * x - b * y
-    turned = a * y + b * x
+    at = 2 * SIZE * entries[k]
+    factor, turned = over_diagonal(k, eight(matrix, at), eight(matrix, at + SIZE), plan, matrix)
     # The entry below the second diagonal without the first step, over that diagonal.
     at = 2 * SIZE * (plan.diagonal[k] + 1)
     to = 2 * SIZE * entries[k + 1]
@@ -474,10 +474,7 @@ def take_out_two(k: int, i: int, entries: Integers, cases: int, plan: Eliminatio
     b = eight(matrix, at + SIZE)
     c = eight(matrix, to) - factor * a + turned * b
     d = eight(matrix, to + SIZE) - factor * b - turned * a
-    x = eight(matrix, 2 * SIZE * plan.diagonal[k + 1])
-    y = eight(matrix, 2 * SIZE * plan.diagonal[k + 1] + SIZE)
-    second = c * x - d * y
-    second_turned = c * y + d * x
+    second, second_turned = over_diagonal(k + 1, c, d, plan, matrix)
     begin = plan.diagonal[k] + 2
     ahead = plan.diagonal[k + 1] + 1 - begin
     for entry in range(begin, plan.first[k + 1]):
@@ -503,8 +500,6 @@ def take_out_two(k: int, i: int, entries: Integers, cases: int, plan: Eliminatio
 @kernel
 def substitute_back(k: int, cases: int, plan: Elimination, matrix: Floats, out: Floats) -> None:
     """Find the solution of step k from those of later ones."""
-    x = eight(matrix, 2 * SIZE * plan.diagonal[k])
-    y = eight(matrix, 2 * SIZE * plan.diagonal[k] + SIZE)
     for case in range(cases):
         to = 2 * SIZE * (k * cases + case)
         p = eight(out, to)
@@ -518,5 +513,6 @@ def substitute_back(k: int, cases: int, plan: Elimination, matrix: Floats, out: 
             d = eight(out, known + SIZE)
             p = p - a * c + b * d
             q = q - a * d - b * c
-        put(out, to, p * x - q * y)
-        put(out, to + SIZE, p * y + q * x)
+        p, q = over_diagonal(k, p, q, plan, matrix)
+        put(out, to, p)
+        put(out, to + SIZE, q)

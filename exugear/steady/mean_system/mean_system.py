@@ -445,7 +445,9 @@ def _stiffness_at_rest(frame: RotatingFrame, psi: float, u: Floats) -> Floats:
 def _mean_stiffness(frame: RotatingFrame, places: Floats, speed: float, u: Floats) -> Floats:
     """Mean stiffness (size, size) over angles of the input, rad; what the rotation adds is that of the first."""
     first = _stiffness(frame, float(places[0]), speed, u)
-    at_rest = [_stiffness_at_rest(frame, float(psi), u) for psi in places] if len(places) > 1 else [np.zeros(1)]
+    if len(places) == 1:
+        return first
+    at_rest = [_stiffness_at_rest(frame, float(psi), u) for psi in places]
     return np.asarray(first + np.mean(at_rest, axis=0) - at_rest[0])
 
 

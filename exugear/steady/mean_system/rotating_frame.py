@@ -30,10 +30,10 @@ PLACES = 4
 """Places of the carrier between one planet's and the next, over which matrices are averaged, at least.
 
 A thousandth of a light resonance's amplitude hangs on it: 5e-6 of a frequency."""
-MOST_KEPT = 16
-"""Angles at which matrices are kept: 3 MB each for the GRC with all bodies flexible."""
 SINGLE_PLACES = 8
 """The same over a revolution where planets are not alike: stiffness has harmonics up to the second."""
+MOST_KEPT = 16
+"""Angles at which matrices are kept: 3 MB each for the GRC with all bodies flexible."""
 
 
 @dataclass(frozen=True, eq=False)
