@@ -98,16 +98,6 @@ def is_excited(data: xr.Dataset) -> bool:
     return bool((data["amplitude"][:, 1:, 0] > LEAST_AMPLITUDE).any())
 
 
-def _in_time(data: xr.Dataset, options: str = "") -> str:
-    """Return what evaluates nonlinear models: the method `nonlinear`, or a run.
-
-    The method has neither displaced planet pins nor stiffness that varies with the carrier.
-    """
-    if data.attrs.get("varying_carrier") or _load_sharing(data):
-        return f"exugear run{options}"
-    return f"{options} --method nonlinear".strip()
-
-
 def _load_sharing(data: xr.Dataset) -> dict[str, float]:
     """K_gamma of families whose planets are loaded unequally."""
     found: dict[str, float] = json.loads(str(data.attrs.get("load_sharing", "{}")))
@@ -163,11 +153,12 @@ def _models(data: xr.Dataset) -> Iterator[Finding]:
     for pull in () if LAWS[model].loses_contact else pulls(data):
         text = f"{pull.name}: tensile mesh force at {pull.count} of {data.sizes['point']} speeds, at most "
         text += f"{100.0 * pull.share:.2g} % of the time at {_rpm(pull.speed)}; amplitudes there are invalid, because "
-        text += f"the model {model} neglects contact loss; use {_in_time(data, ' --mesh-model table')}"
+        text += f"the model {model} neglects contact loss; use --mesh-model table --method nonlinear"
         yield Finding("warning", text, pull.share)
     turned = any(str(name).startswith("rotation of ") for name in data["base"].values)
     waves = any(str(name).endswith(" cosine") for name in data["mesh_wave"].values)
-    if LAWS[model].loses_contact and turned and waves and Variant.of(str(data.attrs["variant"])).has_bearings:
+    at_their_mean = turned and waves and not _load_sharing(data)
+    if LAWS[model].loses_contact and at_their_mean and Variant.of(str(data.attrs["variant"])).has_bearings:
         text = "planets count at their mean under excitations: what unequal load sharing adds as they pass is left out "
         text += "(2 % of the orders of the GRC off resonances); leave the excitations out (--without NAME) to see its "
         text += "size, or use exugear run"
@@ -183,7 +174,7 @@ def _models(data: xr.Dataset) -> Iterator[Finding]:
     if names := str(data.attrs["bearings_in_time"]):
         yield Finding("note", f"nonlinear bearings (rolling elements evaluated in time): {names}")
     elif "16281" in data.attrs["bearing_laws"]:
-        text = f"nonlinear bearings are linearised at the static load; {_in_time(data)} evaluates the nonlinear model"
+        text = "nonlinear bearings are linearised at the static load; --method nonlinear evaluates the nonlinear model"
         yield Finding("note", text)
     if swings := bearing_swings(data):
         loads = [f"{own.name} {_percent(own.share)} at {_rpm(own.speed)}" for own in swings[:SHOWN_BEARINGS]]
@@ -191,7 +182,9 @@ def _models(data: xr.Dataset) -> Iterator[Finding]:
         text = (
             f"dynamic load of bearings over {100.0 * STRAINED:.0f} % of their static load ({'; '.join(loads)}{more}): "
         )
-        text += f'outside the linear range, peaks there are too high; set model = "iso16281" and use {_in_time(data)}'
+        # Rolling elements of planets that are not alike are evaluated by runs alone.
+        way = "exugear run" if data.attrs.get("varying_carrier") else "--method nonlinear"
+        text += f'outside the linear range, peaks there are too high; set model = "iso16281" and use {way}'
         yield Finding("warning", text, swings[0].share)
     variation = float(data.attrs["stiffness_variation"])
     if variation > NOTICED_VARIATION:

@@ -177,26 +177,17 @@ def check_law(name: str, method: Method) -> None:
 
 
 def check_nonlinear(gearbox: Gearbox, method: Method) -> None:
-    """Refuse trains without meshes, and displaced pins of planets that are alike, with models evaluated in time.
+    """Refuse trains without meshes with models evaluated in time.
 
     Raises
     ------
     SteadyError
-        The gearbox file has displaced pins or no meshes, and the method is ``nonlinear``.
+        The gearbox file has no meshes, and the method is ``nonlinear``.
     """
-    if method != "nonlinear":
-        return
-    if not gearbox.meshes:
+    if method == "nonlinear" and not gearbox.meshes:
         raise SteadyError(
             "meshes: the train has none whose forces the method nonlinear could evaluate; use --method parametric, or "
             "exugear run"
-        )
-    unlike = unlike_families(gearbox.bodies())  # displaced pins of these are part of the static state
-    alike = {body.name for body in gearbox.bodies() if body.carrier is not None and body.carrier not in unlike}
-    if alike & gearbox.pin_offsets.keys():
-        raise SteadyError(
-            "pins: the method nonlinear does not include displaced pins of equally spaced planets; use --method "
-            "parametric with --mesh-model line_of_action, or exugear run"
         )
 
 

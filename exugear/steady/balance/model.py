@@ -688,11 +688,24 @@ class HarmonicBalanceModel:
             loads += self.system.at(self._friction, speed)
         return loads
 
-    def with_turned_loads(self, interface: Interface, motion: Complexes) -> Interface:
-        """Return the interface with stated loads at the angles to which a motion (n, size) turns their bodies."""
-        static = self.system.static_at(interface.speed)
-        change = self.shaft_orders.change_by_turning(self.sampling, motion, interface.speed, static)
+    def with_following_loads(self, interface: Interface, motion: Complexes) -> Interface:
+        """Return the interface with the loads that follow a motion (n, size).
+
+        Stated loads are at the angles to which it turns their bodies, and bearings of unequally loaded planets have the
+        forces that it gives them.
+        """
+        change = self.unequal_bearing_loads(interface.speed, motion)
+        if self.shaft_orders.has_loads:
+            static = self.system.static_at(interface.speed)
+            change = change + self.shaft_orders.change_by_turning(self.sampling, motion, interface.speed, static)
         return self.with_more_loads(interface, change)
+
+    def unequal_bearing_loads(self, speed: float, motion: Complexes) -> Complexes:
+        """Find what bearings of unequally loaded planets add in a motion: loads and reactions (n, size + 6 r)."""
+        found = np.zeros_like(motion)
+        for own in self.shaft_orders.bearings:
+            found += own.at(self.lines, self.base_names.index(own.carrier), speed, motion)[0]
+        return np.hstack([found, np.zeros((len(motion), BODY_SIZE * len(self.reacting_excitations)))])
 
     def with_more_loads(self, interface: Interface, more: Complexes) -> Interface:
         """Return the interface with loads and reactions (n, size + 6 r) in addition to those of the shafts' orders."""

@@ -52,8 +52,8 @@ STEP_TOLERANCE = 1e-3
 MOST_STEPS = 40
 PATIENCE, STALLED = 6, 0.5
 """Newton steps over which the residual has to fall to this share, or the search is given up."""
-MOST_TURNS = 12
-"""Times that stated loads are turned with their bodies at most."""
+MOST_FOLLOWED = 12
+"""Times that loads follow the motion at most."""
 SHORTEST = 1.0 / 64.0
 """Share of a Newton step to which it is halved while it does not lower the residual."""
 
@@ -416,10 +416,10 @@ class HarmonicResidual:
         """Find what is missing to the balance (n, m, r)."""
         return readings - self.static - self.answer(self.forces(readings)[0])
 
-    def with_turned_loads(self, readings: Complexes) -> HarmonicResidual:
-        """Return the balance with stated loads turned by the motion that readings (n, m, r) belong to."""
+    def with_following_loads(self, readings: Complexes) -> HarmonicResidual:
+        """Return the balance with loads that follow the motion that readings (n, m, r) belong to."""
         motion = response_of_readings(self, readings).motion
-        return replace(self, interface=self.model.with_turned_loads(self.interface, motion))
+        return replace(self, interface=self.model.with_following_loads(self.interface, motion))
 
     def answer(self, excess: Complexes) -> Complexes:
         """Find the readings -G F (n, m, r) under forces (n, m, f)."""
@@ -526,41 +526,53 @@ def nonlinear_response(
         Newton's method found no balance from this start.
     """
     balance = HarmonicResidual(model, interface, sampling)
-    balance, readings, products = solve_turning(balance, balance.static if start is None else start)
+    balance, readings, products = solve_following(balance, balance.static if start is None else start)
     return response_of_readings(balance, readings, products), readings
 
 
 def turned_balance(model: HarmonicBalanceModel, interface: Interface, readings: Complexes) -> HarmonicResidual:
     """Return the balance of a model with stated loads at the angles that readings (n, m, r) give their bodies."""
     balance = HarmonicResidual(model, interface, model.sampling)
-    return balance.with_turned_loads(readings) if model.shaft_orders.has_loads else balance
+    return balance.with_following_loads(readings) if model.shaft_orders.has_loads else balance
 
 
-def solve_turning(
+def solve_following(
     balance: HarmonicResidual, readings: Complexes, enough: float = BALANCED
 ) -> tuple[HarmonicResidual, Complexes, int]:
-    """Solve the balance with stated loads that turn with the vibration of their bodies; parameters of `solve_balance`.
+    """Solve the balance with loads that follow the motion; parameters of `solve_balance`.
 
-    Where the loads do not settle, as near standstill where they turn the free gear train by more than a period, they
-    are at the angles of the mean speed, and `LoadResponse.at_mean_angles` says so.
+    These are stated loads that turn with the vibration of their bodies, and forces of the bearings of unequally loaded
+    planets. Where the loads do not settle, as near standstill where they turn the free gear train by more than a
+    period, they are at the angles of the mean speed, and `LoadResponse.at_mean_angles` says so.
+
+    Raises
+    ------
+    HarmonicBalanceError
+        There is no balance near the readings, or forces of bearings do not settle.
     """
     still = balance
     readings, products = solve_balance(balance, readings, enough)
-    if not balance.model.shaft_orders.has_loads:
+    orders = balance.model.shaft_orders
+    if not (orders.has_loads or orders.bearings):
         return balance, readings, products
     size = float(np.linalg.norm(balance.static[..., DEFLECTION]))
     change = np.inf
-    for _ in range(MOST_TURNS):
-        turned = balance.with_turned_loads(readings)
+    for _ in range(MOST_FOLLOWED):
+        followed = balance.with_following_loads(readings)
         before = change
-        change = float(np.linalg.norm((turned.static - balance.static)[..., DEFLECTION])) / size
+        change = float(np.linalg.norm((followed.static - balance.static)[..., DEFLECTION])) / size
         if change <= enough:
             return balance, readings, products
         if change > before:
             break
-        balance = turned
+        balance = followed
         readings, took = solve_balance(balance, readings, enough)
         products += took
+    if not orders.has_loads:
+        raise HarmonicBalanceError(
+            f"no steady state found at {balance.interface.speed:.5g} rad/s: forces of unequally loaded planet bearings "
+            f"still change deflections by {change:.1e}"
+        )
     readings, took = solve_balance(still, readings, enough)
     loads = still.interface.loads
     assert loads is not None

@@ -105,15 +105,6 @@ def _motion(interface: Interface, excess: Complexes) -> Complexes:
     return np.asarray(interface.loads.motion - found[..., 0])
 
 
-def with_unequal_bearings(model: HarmonicBalanceModel, interface: Interface, motion: Complexes) -> Interface:
-    """Return the interface with what bearings of unequally loaded planets have more in a motion (n, size)."""
-    reactions = np.zeros((len(motion), BODY_SIZE * len(model.reacting_excitations)))
-    found = np.zeros_like(motion)
-    for own in model.shaft_orders.bearings:
-        found += own.at(model.lines, model.base_names.index(own.carrier), interface.speed, motion)[0]
-    return model.with_more_loads(interface, np.hstack([found, reactions]))
-
-
 def linear_response(model: HarmonicBalanceModel, interface: Interface) -> Response:
     """Compute the response to static transmission errors as given displacements, first order in stiffness variation.
 
@@ -126,7 +117,8 @@ def linear_response(model: HarmonicBalanceModel, interface: Interface) -> Respon
     forces = excess.reshape(len(excess), -1)
     answer = -np.einsum("nij,nj->ni", interface.deflection_per_force, forces).reshape(excess.shape)[..., DEFLECTION]
     for _ in range(BEARINGS_REPEATED if model.shaft_orders.bearings else 0):
-        interface = with_unequal_bearings(model, interface, _motion(interface, forces))
+        more = model.unequal_bearing_loads(interface.speed, _motion(interface, forces))
+        interface = model.with_more_loads(interface, more)
     return _response(model, interface, interface.static[..., DEFLECTION] + answer, forces, 0)
 
 
@@ -301,7 +293,8 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
         if again and slow is not None:
             moved = slow.forces(deflection, _motion(interface, excess))
         if again and model.shaft_orders.bearings:
-            interface = with_unequal_bearings(model, interface, _motion(interface, excess))
+            more_loads = model.unequal_bearing_loads(interface.speed, _motion(interface, excess))
+            interface = model.with_more_loads(interface, more_loads)
             still = _still(interface, shape, coordinates, lengths)
         if again and model.varying:
             response = _response(model, interface, deflection, excess, products)
