@@ -13,7 +13,6 @@ from exugear.steady.balance.load_sharing import mean_planet_forces
 from exugear.steady.balance.response import dissipated_and_given, signals
 from exugear.steady.findings import response_findings
 from exugear.steady.mean_system.mesh_waves import wave_name
-from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.mean_system.signals import PLANET_AXES, support_waves
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import to_dataset
@@ -26,6 +25,7 @@ from ..cases import gear_trains
 from ..cases.assembled import assembled
 from ..cases.ring import ring_content, write_rim
 from ..cases.steady_runs import apart, column_of, drive_of, rolling, solver_of, whole_run
+from ..cases.table import surface_of
 
 LATE = {"late": {"body": "planet_1", "tangential_um": 20.0, "radial_um": 8.0}}
 PLANE = PLANET_AXES[:2]
@@ -191,18 +191,31 @@ TRAINS = {
 
 
 @pytest.mark.validation
+@pytest.mark.parametrize("method", ["parametric", "nonlinear"])
 @pytest.mark.parametrize("kind", TRAINS)
-def test_gear_trains_of_every_kind_stay_on_their_steady_state_with_a_displaced_pin(kind):
+def test_gear_trains_of_every_kind_stay_on_their_steady_state_with_a_displaced_pin(kind, method):
     """Constant speed, RK4 at 1/60 kHz, the last half of 1.6 s: all lines of the overall error, each planet's forces.
 
     The displacement is larger than the deflection of a mesh, which leaves products of both.
     """
     content, planet, speed = TRAINS[kind]
     assembly = train(content, {"late": LATE["late"] | {"body": planet}})
-    solver = solver_of(assembly, tuple(sorted((0.5 * speed, 2.0 * speed))), "parametric")
+    solver = solver_of(assembly, tuple(sorted((0.5 * speed, 2.0 * speed))), method)
     assert any(name.endswith("carrier") or "carrier_1" in name for name in solver.model.base_names)
     assert apart(solver, speed, 1.6, 1.0 / 60e3, 0.8, assembly)[0] < 2e-3
     assert largest_difference(solver, speed, 1.6, 1.0 / 60e3, 0.8, assembly) < 1e-3
+
+
+@pytest.mark.validation
+@pytest.mark.parametrize(("planets", "variation"), [(3, 1.0), (4, 1.0), (3, 20.0)])
+def test_tables_stay_on_their_steady_state_with_a_displaced_pin(planets, variation):
+    """The same with tables in all meshes, also where mesh forces vary by a fifth of the mean."""
+    gearbox = Gearbox.from_dict(gear_trains.planetary("ring", planets) | {"pins": LATE})
+    tables = {name: surface_of(gearbox, name, variation=variation, stiffness=4e8) for name in gearbox.pairs}
+    assembly = assemble(gearbox, Choice("bushing", mesh_model="table"), tables)
+    solver = solver_of(assembly, (45.0, 180.0), "nonlinear", None)
+    assert apart(solver, 90.0, 1.6, 1.0 / 60e3, 0.8, assembly)[0] < 5e-4
+    assert largest_difference(solver, 90.0, 1.6, 1.0 / 60e3, 0.8, assembly) < 1e-3
 
 
 @pytest.mark.validation
@@ -232,17 +245,11 @@ def test_pins_that_are_hardly_displaced_change_nothing_else():
 def test_the_power_of_displaced_pins_is_what_the_dampers_dissipate(grc, stiffness):
     """Bearings of the planets are unequal, too."""
     assembly = assemble(grc.varied({"pins": LATE}), Choice("bushing"), stiffness)
-    for level in ("linear", "parametric"):
+    for level in ("linear", "parametric", "nonlinear"):
         solver = solver_of(assembly, (1.0, 22.5), level)
         assert solver.model.shaft_orders.bearings
         taken, given = dissipated_and_given(solver.model, solver.response(10.0))
         assert taken == pytest.approx(given, rel=1e-5)
-
-
-def test_the_nonlinear_method_is_refused_by_name():
-    settings = SteadySettings(SpeedRange(50.0, 150.0, 4), "nonlinear")
-    with pytest.raises(SteadyError, match=r"pins: the method nonlinear .* use --method parametric"):
-        response_of(train(gear_trains.planetary("ring")), settings)
 
 
 CARRIER = ("plc_a", "plc_b", "lss_a")
@@ -275,7 +282,8 @@ def place_of(layout, support, axis):
 
 
 @pytest.mark.validation
-def test_a_displaced_pin_of_the_gearbox_brings_the_order_of_the_carrier_and_sidebands(grc, stiffness):
+@pytest.mark.parametrize("method", ["parametric", "nonlinear"])
+def test_a_displaced_pin_of_the_gearbox_brings_the_order_of_the_carrier_and_sidebands(grc, stiffness, method):
     """Constant speed of 10 rad/s, RK4 at 1/120 kHz, the last 2 of 3 s; one pin displaced by 20 um along the tangent.
 
     Amplitudes of the forces of bearings of carrier and sun shaft: the order of the carrier, all mesh orders together,
@@ -285,7 +293,7 @@ def test_a_displaced_pin_of_the_gearbox_brings_the_order_of_the_carrier_and_side
     """
     pins = {"late": {"body": "planet_1", "tangential_um": 20.0}}
     assembly = assemble(grc.varied({"pins": pins}), Choice("bushing"), stiffness)
-    solver = solver_of(assembly, (1.0, 22.5), "parametric")
+    solver = solver_of(assembly, (1.0, 22.5), method)
     names = [f"support_force {support} {axis}" for support in CARRIER for axis in "xy"]
     run, known = map(np.abs, lines_of_run(solver, 10.0, assembly, names))
     index = solver.model.lines.index[1:]
@@ -303,12 +311,13 @@ def test_a_displaced_pin_of_the_gearbox_brings_the_order_of_the_carrier_and_side
 
 @needs_meshio
 @pytest.mark.validation
-def test_a_displaced_pin_under_a_flexible_ring_gear_stays_on_its_steady_state(grc, stiffness, tmp_path):
+@pytest.mark.parametrize("method", ["parametric", "nonlinear"])
+def test_a_displaced_pin_under_a_flexible_ring_gear_stays_on_its_steady_state(grc, stiffness, tmp_path, method):
     """The ring is up to 10 mm thinner at two opposite places; RK4 at 1/200 kHz, the last 1.0 of 1.6 s."""
     content = ring_content(grc, tmp_path)
     write_rim(tmp_path / "rim.vtu", oval=0.01)
     gearbox = Gearbox.from_dict(content, str(tmp_path / "stage.toml")).varied({"pins": LATE})
     assembly = assembled(gearbox, Choice("flexible"), stiffness)
-    solver = solver_of(assembly, (7.0, 9.0), "parametric", 9)
+    solver = solver_of(assembly, (7.0, 9.0), method, 9)
     assert apart(solver, 8.0, 1.6, 5e-6, 1.0, assembly)[0] < 2e-3
     assert largest_difference(solver, 8.0, 1.6, 5e-6, 1.0, assembly) < 5e-4
