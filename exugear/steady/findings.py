@@ -175,7 +175,12 @@ def _models(data: xr.Dataset) -> Iterator[Finding]:
         yield Finding("note", f"nonlinear bearings (rolling elements evaluated in time): {names}")
     elif "16281" in data.attrs["bearing_laws"]:
         text = "nonlinear bearings are linearised at the static load; --method nonlinear evaluates the nonlinear model"
-        yield Finding("note", text)
+        if _load_sharing(data):
+            text = (
+                "nonlinear bearings are linearised at the static load, those of planets at their mean although these "
+            )
+            text += "share the load unequally (up to a quarter of a mesh order in the GRC); use --method nonlinear"
+        yield Finding("warning" if _load_sharing(data) else "note", text)
     if swings := bearing_swings(data):
         loads = [f"{own.name} {_percent(own.share)} at {_rpm(own.speed)}" for own in swings[:SHOWN_BEARINGS]]
         more = f"; and {len(swings) - SHOWN_BEARINGS} more" if len(swings) > SHOWN_BEARINGS else ""

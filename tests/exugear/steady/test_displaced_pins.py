@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -29,6 +30,7 @@ from ..cases.table import surface_of
 
 LATE = {"late": {"body": "planet_1", "tangential_um": 20.0, "radial_um": 8.0}}
 PLANE = PLANET_AXES[:2]
+ROLLING = ("pl_a", "pl_b", "lss_a", "lss_bc", "ims_a", "ims_bc", "hss_a", "hss_bc")
 CYCLE = 2.0 * np.pi * np.arange(50) / 50
 SHAPE = 1.0 + 0.08 * np.cos(CYCLE) + 0.03 * np.sin(2 * CYCLE)
 
@@ -196,13 +198,15 @@ TRAINS = {
 def test_gear_trains_of_every_kind_stay_on_their_steady_state_with_a_displaced_pin(kind, method):
     """Constant speed, RK4 at 1/60 kHz, the last half of 1.6 s: all lines of the overall error, each planet's forces.
 
-    The displacement is larger than the deflection of a mesh, which leaves products of both.
+    The displacement is larger than the deflection of a mesh, which leaves products of both. Where the input turns
+    slowly, the run is long enough for two revolutions of the carrier, whose lines lie close together.
     """
     content, planet, speed = TRAINS[kind]
     assembly = train(content, {"late": LATE["late"] | {"body": planet}})
     solver = solver_of(assembly, tuple(sorted((0.5 * speed, 2.0 * speed))), method)
     assert any(name.endswith("carrier") or "carrier_1" in name for name in solver.model.base_names)
-    assert apart(solver, speed, 1.6, 1.0 / 60e3, 0.8, assembly)[0] < 2e-3
+    duration, last = (1.6, 0.8) if speed > 10.0 else (5.0, 4.2)
+    assert apart(solver, speed, duration, 1.0 / 60e3, last, assembly)[0] < 2e-3
     assert largest_difference(solver, speed, 1.6, 1.0 / 60e3, 0.8, assembly) < 1e-3
 
 
@@ -250,6 +254,18 @@ def test_the_power_of_displaced_pins_is_what_the_dampers_dissipate(grc, stiffnes
         assert solver.model.shaft_orders.bearings
         taken, given = dissipated_and_given(solver.model, solver.response(10.0))
         assert taken == pytest.approx(given, rel=1e-5)
+
+
+def test_a_response_warns_of_rolling_elements_that_are_loaded_unequally(grc, stiffness):
+    said = {}
+    for name, pins in (("without", {}), ("late", LATE)):
+        gearbox = grc.varied({"bearings.pl_a.model": "iso16281", "bearings.pl_b.model": "iso16281", "pins": pins})
+        settings = SteadySettings(SpeedRange(9.0, 10.0, 2), at_resonances=False)
+        data = to_dataset(response_of(assemble(gearbox, Choice("bushing"), stiffness), settings))
+        (said[name],) = [finding for finding in response_findings(data) if "linearised" in finding.text]
+    assert said["without"].level == "note"
+    assert said["late"].level == "warning"
+    assert "share the load unequally" in said["late"].text
 
 
 CARRIER = ("plc_a", "plc_b", "lss_a")
@@ -302,11 +318,33 @@ def test_a_displaced_pin_of_the_gearbox_brings_the_order_of_the_carrier_and_side
     np.testing.assert_allclose(known[slow], run[slow], rtol=3e-4)
     of_meshes = index[:, :3].any(axis=1)
     beside = (index[:, 3] != 0) & of_meshes
-    assert np.linalg.norm(known[beside] - run[beside]) < 0.02 * np.linalg.norm(run[beside])
+    most = 0.012 if method == "parametric" else 4e-3
+    assert np.linalg.norm(known[beside] - run[beside]) < most * np.linalg.norm(run[beside])
     assert np.linalg.norm(run[beside]) > 0.1 * np.linalg.norm(run[of_meshes])
     others = of_meshes & ~beside
     assert np.linalg.norm(known[others] - run[others]) < 5e-3 * np.linalg.norm(run[others])
     assert largest_difference(solver, 10.0, 3.0, 1.0 / 120e3, 2.0, assembly) < 5e-4
+
+
+@pytest.mark.validation
+@pytest.mark.long
+def test_a_displaced_pin_on_rolling_elements_brings_the_sidebands_of_a_run(grc, stiffness):
+    """As before, with ISO/TS 16281 in all bearings, at 12 rad/s, where the first mesh order meets modes of planets.
+
+    Elements of each planet's bearings stand alike in the run, as they do in the response.
+    """
+    rows = {f"bearings.{family}.model": "iso16281" for family in ROLLING}
+    pins = {"late": {"body": "planet_1", "tangential_um": 20.0}}
+    assembly = assemble(grc.varied(rows | {"pins": pins}), Choice("bushing"), stiffness)
+    solver = solver_of(assembly, (1.0, 22.5), "nonlinear")
+    alike = solver.model.waves.assembly.connectors.rolling
+    assembly = replace(assembly, connectors=assembly.connectors._replace(rolling=alike))
+    names = [f"support_force {support} {axis}" for support in CARRIER for axis in "xy"]
+    run, known = map(np.abs, lines_of_run(solver, 12.0, assembly, names))
+    index = solver.model.lines.index[1:]
+    beside = (index[:, 3] != 0) & index[:, :3].any(axis=1)
+    assert np.linalg.norm(known[beside] - run[beside]) < 0.01 * np.linalg.norm(run[beside])
+    assert largest_difference(solver, 12.0, 3.0, 1.0 / 120e3, 2.0, assembly) < 1e-3
 
 
 @needs_meshio
