@@ -24,7 +24,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
-import h5netcdf
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,6 +34,7 @@ from fe_ste.tools.files import FileError, replacement
 from fe_ste.tools.stores import ErrorKeeper, Layout, load_dataset, open_sealed, seal, write_arrays
 
 if TYPE_CHECKING:
+    import h5netcdf
     import xarray as xr
 
 STATE = (
@@ -383,6 +383,8 @@ class RunFile:
 
     def _take(self, piece: Piece) -> None:
         if self._last is None:
+            import h5netcdf  # most commands read no run
+
             self._raw = self._open.enter_context(replacement(self._path, self._pieces.folder))
             self._target = ErrorKeeper(self._raw)
             self._file = self._open.enter_context(h5netcdf.File(self._target, "w"))
@@ -463,6 +465,8 @@ def read_run(path: Path, names: Iterable[str]) -> tuple[dict[str, NDArray[Any]],
     if path.is_dir():
         stopped = load_run(path, names)
         return {str(name): stopped[name].to_numpy() for name in stopped.variables}, dict(stopped.attrs)
+    import h5netcdf
+
     with open_sealed(path) as (file, _), h5netcdf.File(file, "r") as run:
         unknown = sorted(set(names) - set(run.variables))
         if unknown:
