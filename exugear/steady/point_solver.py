@@ -23,7 +23,7 @@ from exugear.steady.balance.nonlinear import (
     nonlinear_response,
     response_of_readings,
     solve_balance,
-    solve_following,
+    solve_turning,
     turned_balance,
 )
 from exugear.steady.balance.response import (
@@ -391,7 +391,7 @@ def _refined(model: HarmonicBalanceModel, speed: float, start: Complexes | None)
     readings = balance.static if start is None else start
     products = 0
     for _ in range(MOST_REFINED):
-        balance, readings, took = solve_following(balance, readings, ROUGH)
+        balance, readings, took = solve_turning(balance, readings, ROUGH)
         products += took
         lacking = _lacking(balance, readings)
         if lacking is None:
@@ -402,7 +402,7 @@ def _refined(model: HarmonicBalanceModel, speed: float, start: Complexes | None)
         lines = balance.model.with_lines(joined(balance.model.lines, lacking), kinks)
         balance = HarmonicResidual(lines, lines.at(speed), lines.sampling)
         readings = readings_in(before, readings, lines)
-    balance, readings, took = solve_following(balance, readings)
+    balance, readings, took = solve_turning(balance, readings)
     products += took
     response = response_of_readings(balance, readings, products)
     if _parted(response):
@@ -426,7 +426,7 @@ def _without_aliases(balance: HarmonicResidual, readings: Complexes) -> tuple[Ha
         ahead = HarmonicResidual(denser, balance.interface, denser.sampling)
         if float(np.linalg.norm(ahead.missing(readings)[..., DEFLECTION])) < ALIASED * size:
             break
-        balance, readings, took = solve_following(ahead, readings)
+        balance, readings, took = solve_turning(ahead, readings)
         products += took
     return balance, readings, products
 
@@ -441,7 +441,7 @@ def _lacking(balance: HarmonicResidual, readings: Complexes) -> LineSet | None:
     ahead = HarmonicResidual(whole, whole.at(balance.interface.speed), whole.sampling)
     start = readings_in(balance.model, readings, whole)
     if whole.shaft_orders.has_loads:
-        ahead = ahead.with_following_loads(start)
+        ahead = ahead.with_turned_loads(start)
     excess, tangent, _ = ahead.forces(start)
     missing = tangent.alone(ahead.answer(excess) + ahead.static - start)
     new = _sizes(whole, missing)

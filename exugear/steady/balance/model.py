@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import copy
 import math
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from functools import cached_property
 
@@ -478,10 +479,44 @@ class HarmonicBalanceModel:
         return self._varying_bearings[0]
 
     @cached_property
+    def loaded_bearings(self) -> tuple[UnequalBearings, ...]:
+        """What bearings of planets that displaced pins load unequally have beyond the averaged system, by carrier."""
+        return tuple(own.with_dampers(self.system.damper_factor) for own in self.shaft_orders.bearings)
+
+    @cached_property
+    def unequal_bearings(self) -> tuple[UnequalBearings, ...]:
+        """All bearings that differ from planet to planet: `loaded_bearings`, then `varying_bearings`."""
+        varying = self.varying_bearings
+        return self.loaded_bearings if varying is None else (*self.loaded_bearings, varying)
+
+    @cached_property
+    def bearing_coordinates(self) -> Integers:
+        """Coordinates (c,) that these bearings connect, those of one carrier after the other."""
+        return np.concatenate([np.zeros(0, dtype=np.int64), *(own.coordinates for own in self.unequal_bearings)])
+
+    @cached_property
     def _along_bearings(self) -> Floats:
         """Generalized forces (size, c) of a unit along each coordinate of these bearings."""
-        coordinates = () if self.varying_bearings is None else self.varying_bearings.coordinates
-        return np.eye(self.system.size)[:, list(coordinates)]
+        return np.eye(self.system.size)[:, self.bearing_coordinates]
+
+    def still_bearings(self, speed: float) -> Complexes:
+        """Find forces (n, c) of these bearings in the static state beyond the averaged system, at a speed, rad/s."""
+        none = np.zeros((len(self.lines.index), 0), dtype=complex)
+        found = [own.still_at(self.lines, self.base_names.index(own.carrier), speed) for own in self.unequal_bearings]
+        return np.hstack([none, *found])
+
+    def bearing_coupling(self, bearings: Sequence[UnequalBearings]) -> HarmonicCoupling:
+        """Products of coordinates of bearings, one after the other, with functions of their carriers' angles."""
+        return HarmonicCoupling(self.lines, self._groups_of(bearings, 0))
+
+    def _groups_of(self, bearings: Sequence[UnequalBearings], begin: int) -> tuple[Group, ...]:
+        groups = []
+        for own in bearings:
+            carrier = self.base_names.index(own.carrier)
+            multiples = turns_of_carrier(own.most, carrier, self.lines.index.shape[1])
+            groups.append(Group(begin, len(own.coordinates), multiples))
+            begin += len(own.coordinates)
+        return tuple(groups)
 
     @cached_property
     def coupling(self) -> HarmonicCoupling:
@@ -520,24 +555,20 @@ class HarmonicBalanceModel:
 
     @cached_property
     def whole_coupling(self) -> HarmonicCoupling:
-        """`coupling`, and behind it that of the bearings' coordinates that vary with the carrier."""
-        bearings = self.varying_bearings
-        if bearings is None:
+        """`coupling`, and behind it that of the coordinates of `unequal_bearings`."""
+        if not self.unequal_bearings:
             return self.coupling
         begin = len(self.weights) * self._ports["forces"].shape[2]
-        most = int(np.abs(bearings.turns).max())
-        multiples = turns_of_carrier(most, self.varying[0].carrier, self.lines.index.shape[1])
-        group = Group(begin, len(bearings.coordinates), multiples)
-        return HarmonicCoupling(self.lines, (*self.coupling.groups, group))
+        return HarmonicCoupling(self.lines, (*self.coupling.groups, *self._groups_of(self.unequal_bearings, begin)))
 
     @cached_property
     def bearing_lengths(self) -> Floats:
-        """What coordinates (c,) of the bearings that vary count as a length, m: tilts by the largest base pitch."""
-        if self.varying_bearings is None:
+        """What coordinates (c,) of unequal bearings count as a length, m: tilts by the largest base pitch."""
+        if not self.unequal_bearings:
             return np.zeros(0)
         coordinates = self.waves.assembly.coordinates.values()
         tilts = np.concatenate([index[AXIS_TILT : AXIS_TILT + 2] for index in coordinates])
-        is_tilt = np.isin(self.varying_bearings.coordinates, tilts)
+        is_tilt = np.isin(self.bearing_coordinates, tilts)
         return np.where(is_tilt, float(self.lengths[:, POSITION].max()), 1.0)
 
     @cached_property
@@ -688,24 +719,11 @@ class HarmonicBalanceModel:
             loads += self.system.at(self._friction, speed)
         return loads
 
-    def with_following_loads(self, interface: Interface, motion: Complexes) -> Interface:
-        """Return the interface with the loads that follow a motion (n, size).
-
-        Stated loads are at the angles to which it turns their bodies, and bearings of unequally loaded planets have the
-        forces that it gives them.
-        """
-        change = self.unequal_bearing_loads(interface.speed, motion)
-        if self.shaft_orders.has_loads:
-            static = self.system.static_at(interface.speed)
-            change = change + self.shaft_orders.change_by_turning(self.sampling, motion, interface.speed, static)
+    def with_turned_loads(self, interface: Interface, motion: Complexes) -> Interface:
+        """Return the interface with stated loads at the angles to which a motion (n, size) turns their bodies."""
+        static = self.system.static_at(interface.speed)
+        change = self.shaft_orders.change_by_turning(self.sampling, motion, interface.speed, static)
         return self.with_more_loads(interface, change)
-
-    def unequal_bearing_loads(self, speed: float, motion: Complexes) -> Complexes:
-        """Find what bearings of unequally loaded planets add in a motion: loads and reactions (n, size + 6 r)."""
-        found = np.zeros_like(motion)
-        for own in self.shaft_orders.bearings:
-            found += own.at(self.lines, self.base_names.index(own.carrier), speed, motion)[0]
-        return np.hstack([found, np.zeros((len(motion), BODY_SIZE * len(self.reacting_excitations)))])
 
     def with_more_loads(self, interface: Interface, more: Complexes) -> Interface:
         """Return the interface with loads and reactions (n, size + 6 r) in addition to those of the shafts' orders."""

@@ -52,8 +52,8 @@ STEP_TOLERANCE = 1e-3
 MOST_STEPS = 40
 PATIENCE, STALLED = 6, 0.5
 """Newton steps over which the residual has to fall to this share, or the search is given up."""
-MOST_FOLLOWED = 12
-"""Times that loads follow the motion at most."""
+MOST_TURNS = 12
+"""Times that stated loads are turned with their bodies at most."""
 SHORTEST = 1.0 / 64.0
 """Share of a Newton step to which it is halved while it does not lower the residual."""
 
@@ -75,8 +75,8 @@ class HarmonicResidual:
 
     @cached_property
     def _bearings(self) -> PlanetBearings | None:
-        """Bearings that vary with the carrier; None without any."""
-        return None if self.model.varying_bearings is None else PlanetBearings(self.model, self.interface)
+        """Bearings that differ from planet to planet; None without any."""
+        return PlanetBearings(self.model, self.interface) if self.model.unequal_bearings else None
 
     @cached_property
     def along_bearings(self) -> Complexes:
@@ -416,10 +416,10 @@ class HarmonicResidual:
         """Find what is missing to the balance (n, m, r)."""
         return readings - self.static - self.answer(self.forces(readings)[0])
 
-    def with_following_loads(self, readings: Complexes) -> HarmonicResidual:
-        """Return the balance with loads that follow the motion that readings (n, m, r) belong to."""
+    def with_turned_loads(self, readings: Complexes) -> HarmonicResidual:
+        """Return the balance with stated loads turned by the motion that readings (n, m, r) belong to."""
         motion = response_of_readings(self, readings).motion
-        return replace(self, interface=self.model.with_following_loads(self.interface, motion))
+        return replace(self, interface=self.model.with_turned_loads(self.interface, motion))
 
     def answer(self, excess: Complexes) -> Complexes:
         """Find the readings -G F (n, m, r) under forces (n, m, f)."""
@@ -456,7 +456,7 @@ class Tangent:
         def solved(wanted: Complexes) -> Complexes:
             found = self.alone(wanted)
             if passing is not None:
-                rest = np.zeros((len(found), self.balance.interface.along_bearings.shape[2]), dtype=complex)
+                rest = np.zeros((len(found), self._passing_bearings), dtype=complex)
                 flat = found.reshape(len(found), -1)
                 found = passing.solve(np.hstack([flat, rest]))[:, : flat.shape[1]].reshape(found.shape)
             return lengths * found
@@ -473,6 +473,12 @@ class Tangent:
         found = right.reshape(len(right), -1).copy()
         found[:, read] = (self._inverse @ found[:, read, None])[..., 0]
         return found.reshape(right.shape)
+
+    @property
+    def _passing_bearings(self) -> int:
+        """Number of the coordinates of bearings in `_passing`: those of planets that are not alike."""
+        bearings = self.balance.model.varying_bearings
+        return 0 if bearings is None else len(bearings.coordinates)
 
     @cached_property
     def _passing(self) -> PassingPlanets | None:
@@ -502,8 +508,8 @@ class Tangent:
             parts.append(PlanetBearings.part(model, interface, m * r))
             at = model.varying_bearings.coordinates
             moved = interface.motion[:, at].reshape(n, len(at), m * f)[:, :, forces]
-            along = interface.along_bearings
-            read_there = balance.along_bearings.reshape(n, m * r, -1)
+            along = interface.along_bearings[..., -len(at) :]
+            read_there = balance.along_bearings[..., -len(at) :].reshape(n, m * r, -1)
             answers = np.block([[answers, read_there], [moved, along[:, at]]])
         read = balance.read
         answers[:, read] = self._inverse @ answers[:, read]
@@ -526,53 +532,41 @@ def nonlinear_response(
         Newton's method found no balance from this start.
     """
     balance = HarmonicResidual(model, interface, sampling)
-    balance, readings, products = solve_following(balance, balance.static if start is None else start)
+    balance, readings, products = solve_turning(balance, balance.static if start is None else start)
     return response_of_readings(balance, readings, products), readings
 
 
 def turned_balance(model: HarmonicBalanceModel, interface: Interface, readings: Complexes) -> HarmonicResidual:
     """Return the balance of a model with stated loads at the angles that readings (n, m, r) give their bodies."""
     balance = HarmonicResidual(model, interface, model.sampling)
-    return balance.with_following_loads(readings) if model.shaft_orders.has_loads else balance
+    return balance.with_turned_loads(readings) if model.shaft_orders.has_loads else balance
 
 
-def solve_following(
+def solve_turning(
     balance: HarmonicResidual, readings: Complexes, enough: float = BALANCED
 ) -> tuple[HarmonicResidual, Complexes, int]:
-    """Solve the balance with loads that follow the motion; parameters of `solve_balance`.
+    """Solve the balance with stated loads that turn with the vibration of their bodies; parameters of `solve_balance`.
 
-    These are stated loads that turn with the vibration of their bodies, and forces of the bearings of unequally loaded
-    planets. Where the loads do not settle, as near standstill where they turn the free gear train by more than a
-    period, they are at the angles of the mean speed, and `LoadResponse.at_mean_angles` says so.
-
-    Raises
-    ------
-    HarmonicBalanceError
-        There is no balance near the readings, or forces of bearings do not settle.
+    Where the loads do not settle, as near standstill where they turn the free gear train by more than a period, they
+    are at the angles of the mean speed, and `LoadResponse.at_mean_angles` says so.
     """
     still = balance
     readings, products = solve_balance(balance, readings, enough)
-    orders = balance.model.shaft_orders
-    if not (orders.has_loads or orders.bearings):
+    if not balance.model.shaft_orders.has_loads:
         return balance, readings, products
     size = float(np.linalg.norm(balance.static[..., DEFLECTION]))
     change = np.inf
-    for _ in range(MOST_FOLLOWED):
-        followed = balance.with_following_loads(readings)
+    for _ in range(MOST_TURNS):
+        turned = balance.with_turned_loads(readings)
         before = change
-        change = float(np.linalg.norm((followed.static - balance.static)[..., DEFLECTION])) / size
+        change = float(np.linalg.norm((turned.static - balance.static)[..., DEFLECTION])) / size
         if change <= enough:
             return balance, readings, products
         if change > before:
             break
-        balance = followed
+        balance = turned
         readings, took = solve_balance(balance, readings, enough)
         products += took
-    if not orders.has_loads:
-        raise HarmonicBalanceError(
-            f"no steady state found at {balance.interface.speed:.5g} rad/s: forces of unequally loaded planet bearings "
-            f"still change deflections by {change:.1e}"
-        )
     readings, took = solve_balance(still, readings, enough)
     loads = still.interface.loads
     assert loads is not None

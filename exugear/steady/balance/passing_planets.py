@@ -32,9 +32,14 @@ from scipy.linalg.lapack import zgetrs
 
 from exugear.steady.balance.interface import Interface
 from exugear.steady.balance.model import HarmonicBalanceModel, turns_of_carrier
+from exugear.steady.harmonics.linear_solvers import solve_lines
 from exugear.steady.harmonics.lines import Group, HarmonicCoupling
 from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, CycleFunctions, Family
+from exugear.steady.mean_system.unequal_bearings import UnequalBearings
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
+
+BEARINGS_TOLERANCE = 1e-11
+"""Residual of the motion of bearings over what it would be without their differences."""
 
 
 class SolvedGroups(NamedTuple):
@@ -227,7 +232,7 @@ def passing_planets(
         carried = carried_readings(model, interface.speed, family, forces)
         parts.append(VaryingPart(own, over_cycle[len(over_cycle) // 2], of_damper / lengths[own], carried))
     if model.varying_bearings is not None:
-        part = PlanetBearings.part(model, interface, forces * len(model.weights))
+        part = PlanetBearings.part(model, interface, answers.shape[1] - len(model.varying_bearings.coordinates))
         parts.append(part._replace(stiffness=functions[-1], damping=part.damping / lengths[part.readings]))
     at = np.concatenate([np.arange(part.readings.start, part.readings.stop) for part in parts])
     return PassingPlanets(model, interface, parts, answers[..., at])
@@ -238,23 +243,44 @@ def carried_readings(model: HarmonicBalanceModel, speed: float, family: Family, 
     return np.asarray(speed * np.kron(model.waves.partners[family.waves, family.waves], np.eye(readings)))
 
 
+class BearingForces:
+    """Forces of some bearings beyond the averaged system, from their motion; n lines, c coordinates."""
+
+    def __init__(self, model: HarmonicBalanceModel, interface: Interface, bearings: Sequence[UnequalBearings]) -> None:
+        self._coupling = model.bearing_coupling(bearings)
+        self._rate = 1j * interface.frequencies[:, None]
+        functions = [own.functions_at(interface.speed) for own in bearings]
+        self._stiffness, self._damping = ([own[n] for own in functions] for n in (0, 1))
+
+    def of_dampers(self, motion: Complexes) -> Complexes:
+        """Return the forces (n, c) of their dampers in a motion (n, c)."""
+        return self._coupling.of(self._damping, self._rate * motion)
+
+    def __call__(self, motion: Complexes) -> Complexes:
+        """Return all their forces (n, c) in a motion (n, c), without those of the static state."""
+        return self._coupling.of(self._stiffness, motion) + self.of_dampers(motion)
+
+
 class PlanetBearings:
-    """Bearings that vary with the carrier, taken out of the balance of laws in time; n lines, c coordinates.
+    """Bearings that differ from planet to planet, taken out of the balance of other laws; n lines, c coordinates.
 
     Along their coordinates q they have forces b + S q beyond the averaged system, which answers q = q_0 - H_b (b + S q)
     to them: q_0 is the motion under all other forces, and S couples lines at multiples of the carrier's angle alone.
+    Those of planets that are not alike are solved directly, and by GMRES where displaced pins load others unequally.
     """
 
     def __init__(self, model: HarmonicBalanceModel, interface: Interface) -> None:
-        bearings = model.varying_bearings
-        assert bearings is not None
-        self._at = bearings.coordinates
-        still = bearings.still_at(model.lines, model.varying[0].carrier, interface.speed)
-        own = interface.along_bearings[:, self._at]
-        self._coupling = PassingPlanets(model, interface, [self.part(model, interface)], own)
-        loads = 0.0 if interface.loads is None else interface.loads.motion[:, self._at]
-        self._of_meshes = interface.motion[:, self._at].reshape(len(own), len(self._at), -1)
-        self.given = still + self._varying(loads - (own @ still[..., None])[..., 0])
+        at = model.bearing_coordinates
+        self._own = interface.along_bearings[:, at]
+        self._lengths = model.bearing_lengths
+        self._forces = BearingForces(model, interface, model.unequal_bearings)
+        self._passing = None
+        if not model.loaded_bearings:
+            self._passing = PassingPlanets(model, interface, [self.part(model, interface)], self._own)
+        still = model.still_bearings(interface.speed)
+        loads = 0.0 if interface.loads is None else interface.loads.motion[:, at]
+        self._of_meshes = interface.motion[:, at].reshape(len(self._own), len(at), -1)
+        self.given = still + self._varying(loads - (self._own @ still[..., None])[..., 0])
         """(n, c) forces where laws have none beyond the averaged system."""
 
     @staticmethod
@@ -272,4 +298,10 @@ class PlanetBearings:
 
     def _varying(self, motion: Complexes) -> Complexes:
         """Return the forces (n, c) S q where the averaged system without them moves by (n, c)."""
-        return self._coupling.forces(self._coupling.solve(motion))
+        if self._passing is not None:
+            return self._passing.forces(self._passing.solve(motion))
+
+        def apply(scaled: Complexes) -> Complexes:
+            return scaled + self._lengths * (self._own @ self._forces(scaled / self._lengths)[..., None])[..., 0]
+
+        return self._forces(solve_lines(apply, self._lengths * motion, BEARINGS_TOLERANCE)[0] / self._lengths)

@@ -23,7 +23,7 @@ import numpy as np
 
 from exugear.steady.balance.interface import Interface
 from exugear.steady.balance.model import HarmonicBalanceModel
-from exugear.steady.balance.passing_planets import PassingPlanets, passing_planets
+from exugear.steady.balance.passing_planets import BearingForces, PassingPlanets, PlanetBearings, passing_planets
 from exugear.steady.harmonics.linear_solvers import solve_lines
 from exugear.steady.harmonics.lines import add_answered, flat
 from exugear.steady.mean_system.bearing_waves import TILTS
@@ -47,8 +47,6 @@ PASSING_TOLERANCE = 1e-6
 """The same where stiffness varies with the carrier: neighbours that are left out are larger by far."""
 POSITIONS_REPEATED = 2
 """Solutions after the first one, with positions in the mesh cycle that move with the orders of shafts."""
-BEARINGS_REPEATED = 2
-"""Times that forces of bearings of unequally loaded planets follow from the solution before."""
 LARGEST_SHIFT = 0.1
 """Motion of a position, mesh cycles, above which forces are not linear in it: it is neglected there.
 
@@ -116,9 +114,12 @@ def linear_response(model: HarmonicBalanceModel, interface: Interface) -> Respon
     excess[..., DEFLECTION] += mean_deviation_forces(model, interface.speed)
     forces = excess.reshape(len(excess), -1)
     answer = -np.einsum("nij,nj->ni", interface.deflection_per_force, forces).reshape(excess.shape)[..., DEFLECTION]
-    for _ in range(BEARINGS_REPEATED if model.shaft_orders.bearings else 0):
-        more = model.unequal_bearing_loads(interface.speed, _motion(interface, forces))
-        interface = model.with_more_loads(interface, more)
+    if model.unequal_bearings:
+        bearings = PlanetBearings(model, interface)
+        of_bearings = bearings.given + bearings.forces(excess)
+        read = interface.read(interface.along_bearings)[..., DEFLECTION, :]
+        answer -= (read @ of_bearings[..., None])[..., 0]
+        forces = np.hstack([forces, of_bearings])
     return _response(model, interface, interface.static[..., DEFLECTION] + answer, forces, 0)
 
 
@@ -262,15 +263,13 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
     shape = len(model.lines.index), *interface.ports.forces.shape[:2]
     of_meshes = shape[1] * shape[2]
     lengths = np.append(model.lengths[: shape[1], : shape[2]].ravel(), model.bearing_lengths)
-    coordinates = _varying_coordinates(model)
+    coordinates = model.bearing_coordinates
     answers = lengths[:, None] * interface.answers_with(coordinates)
     still = _still(interface, shape, coordinates, lengths)
     repeated = bool(model.shaft_orders.sidebands or model.varying)
     balance = LineBalance(model, interface, answers, lengths)
     passing = balance.passing
-    of_bearings = np.zeros((shape[0], 0), dtype=complex)
-    if model.varying_bearings is not None:
-        of_bearings = model.varying_bearings.still_at(model.lines, model.varying[0].carrier, interface.speed)
+    of_bearings = model.still_bearings(interface.speed)
     given = given_forces(model, interface) + deviation_forces(model, interface, passing)
     moved = np.zeros_like(given)
     slow = SlowChanges(model, interface) if repeated else None
@@ -292,21 +291,12 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
                 break
         if again and slow is not None:
             moved = slow.forces(deflection, _motion(interface, excess))
-        if again and model.shaft_orders.bearings:
-            more_loads = model.unequal_bearing_loads(interface.speed, _motion(interface, excess))
-            interface = model.with_more_loads(interface, more_loads)
-            still = _still(interface, shape, coordinates, lengths)
         if again and model.varying:
             response = _response(model, interface, deflection, excess, products)
             shifted = at_mean_positions(model, interface, response)
             balance = LineBalance(model, shifted, answers, lengths, passing)
             given = given_forces(model, shifted) + deviation_forces(model, shifted, passing)
     return _response(model, interface, deflection, excess, products)
-
-
-def _varying_coordinates(model: HarmonicBalanceModel) -> Integers:
-    """Coordinates (c,) of the bearings that vary with the carrier."""
-    return np.zeros(0, dtype=np.int64) if model.varying_bearings is None else model.varying_bearings.coordinates
 
 
 def _still(interface: Interface, shape: tuple[int, ...], coordinates: Integers, lengths: Floats) -> Complexes:
@@ -338,8 +328,8 @@ class LineBalance:
         passing: PassingPlanets | None = None,
     ) -> None:
         functions = model.cycles.tangents_beyond_mean.at(interface.ports, interface.speed)
-        if model.varying_bearings is not None:
-            functions.append(model.varying_bearings.functions_at(interface.speed)[0])
+        of_bearings = [own.functions_at(interface.speed) for own in model.unequal_bearings]
+        functions += [stiffness for stiffness, _ in of_bearings]
         self._coupling = model.whole_coupling
         self._functions = [
             function / lengths[group.begin : group.begin + group.size]
@@ -353,19 +343,29 @@ class LineBalance:
         self.passing = passing
         if model.varying and passing is None:
             self.passing = passing_planets(model, interface, self._functions, answers, lengths)
+        self._loaded = BearingForces(model, interface, model.loaded_bearings) if model.loaded_bearings else None
+        begin = len(lengths) - len(model.bearing_lengths)
+        self._at_loaded = slice(begin, begin + sum(len(own.coordinates) for own in model.loaded_bearings))
+        self._lengths = lengths
 
     def _apply(self, readings: Complexes) -> Complexes:
         out = np.empty_like(readings)
         add_answered(cached_bundle(self._coupling.terms), *self._parts, readings, *self._memory, self._octets, out)
-        if self.passing is None:
-            return out
-        damped = self.passing.damper_forces(readings)
-        return self.passing.solve(out + (self._answers @ damped[..., None])[..., 0])
+        if not (self._loaded is None and self.passing is None):
+            out += (self._answers @ self._dampers(readings)[..., None])[..., 0]
+        return out if self.passing is None else self.passing.solve(out)
+
+    def _dampers(self, readings: Complexes) -> Complexes:
+        """Return the forces (n, k) of dampers that are unequal or vary, beyond those of the averaged system."""
+        found = np.zeros_like(readings) if self.passing is None else self.passing.damper_forces(readings)
+        if self._loaded is not None:
+            own = self._at_loaded
+            found[:, own] += self._loaded.of_dampers(readings[:, own] / self._lengths[own])
+        return found
 
     def forces(self, readings: Complexes) -> Complexes:
         """Return the forces (n, k) K y."""
-        found = self._coupling.of_flat(self._flat, readings)
-        return found if self.passing is None else found + self.passing.damper_forces(readings)
+        return self._coupling.of_flat(self._flat, readings) + self._dampers(readings)
 
     def solve(self, right: Complexes, start: Complexes | None) -> tuple[Complexes, int]:
         """Solve for readings (n, k); the products with K that it took follow."""
@@ -433,12 +433,9 @@ def signals(model: HarmonicBalanceModel, response: Response) -> Complexes:
     interface = response.interface
     of_motion = interface.rows.of(response.motion, interface.frequencies)
     places = model.pin_places(interface.speed)
-    unequal = model.shaft_orders.bearings
-    if model.varying_bearings is not None:
-        unequal = (*unequal, model.varying_bearings)
-    for own in unequal:
+    for own in model.unequal_bearings:
         carrier = model.base_names.index(own.carrier)
-        more = own.at(model.lines, carrier, interface.speed, response.motion)[1]
+        more = own.signals_at(model.lines, carrier, interface.speed, response.motion)
         of_motion[:, model.support_forces(own.supports).ravel()] += more
     if places.any():  # seats move with them; bearings are not strained
         moving = [name.quantity == "seat_acceleration" for name in interface.rows.names]
@@ -506,7 +503,7 @@ def dissipated_and_given(model: HarmonicBalanceModel, response: Response) -> tup
     along = np.tensordot(rates, ports.forces, axes=(1, 2)) * model.weights[:, None]
     given = -2.0 * float(np.sum((response.excess[1:] * along.conj()).real))
     if response.of_bearings.size:
-        given -= 2.0 * float(np.sum((response.of_bearings[1:] * rates[:, _varying_coordinates(model)].conj()).real))
+        given -= 2.0 * float(np.sum((response.of_bearings[1:] * rates[:, model.bearing_coordinates].conj()).real))
     if interface.loads is not None:
         given += 2.0 * float(np.sum((interface.loads.loads[1:] * rates.conj()).real))
     return taken, given

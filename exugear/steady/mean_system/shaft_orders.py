@@ -329,14 +329,8 @@ class _Series:
             self._add(self.reaction, (DEVIATION, key), self._no_reaction)
             self._add(self.shift, (DEVIATION, key), shift[turn])
             self._add(self.centrifugal, (DEVIATION, key), pushed[turn])
-        # What bearings that are not equal have beyond their mean in the static state.
         if (unequal := unequal_bearings(self.assembly, self.waves.system, planets)) is not None:
             self.bearings.append(unequal)
-            for turn, still in zip(unequal.turns.tolist(), unequal.still, strict=True):
-                if 0 <= turn <= most:
-                    bearing_forces = self._no_reaction
-                    bearing_forces[unequal.coordinates] = still
-                    self._add(self.reaction, (DEVIATION, self._turns(planets, turn)), bearing_forces)
         # Lateral vibration of central bodies and unequally stiff bearings pass on to lines at further turns.
         rows = np.diff(self.assembly.connectors.rolling.first)
         on_planets = [support.body in planets.names for support in self.assembly.supports]

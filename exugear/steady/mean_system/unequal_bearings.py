@@ -7,8 +7,7 @@ the same at all angles. In the frame of the carrier the difference stands still,
     T'(psi) f(T(psi) u, T(psi) u') = sum_l e^(i l psi) (b_l + A_l u + B_l u'),
 
 so that the static state has forces b_l at multiples of the carrier's rotation, and each line of the response acts on
-those beside it. Differences by displaced pins are small: their forces follow from the solution before. Those of planets
-that are not alike are solved with the meshes (`exugear.steady.balance.passing_planets`).
+those beside it. Their forces are solved with those of the meshes (`exugear.steady.balance.passing_planets`).
 """
 
 from __future__ import annotations
@@ -65,14 +64,24 @@ class UnequalBearings:
     signals_damping: Complexes
     """(t, r, c) derivatives of these."""
 
+    @property
+    def most(self) -> int:
+        """Largest multiple of the carrier's angle."""
+        return int(np.abs(self.turns).max())
+
+    def with_dampers(self, factor: float) -> UnequalBearings:
+        """Return the same with dampers multiplied by a factor."""
+        if factor == 1.0:
+            return self
+        return replace(self, damping=factor * self.damping, signals_damping=factor * self.signals_damping)
+
     def functions_at(self, speed: float) -> tuple[Complexes, Complexes]:
         """Stiffness and damping (2 t + 1, c, c) at multiples -t .. t of the base of the carrier, at an input speed.
 
         They give forces that the bodies feel in the opposite sense, as those of meshes.
         """
-        most = int(np.abs(self.turns).max())
-        found = np.zeros((2, 2 * most + 1, *self.stiffness.shape[1:]), dtype=complex)
-        found[:, self.sense * self.turns + most] = -self.stiffness, -self.damping
+        found = np.zeros((2, 2 * self.most + 1, *self.stiffness.shape[1:]), dtype=complex)
+        found[:, self.sense * self.turns + self.most] = -self.stiffness, -self.damping
         return (found[0], found[1]) if speed > 0.0 else (found[0].conj(), found[1].conj())
 
     def _places(self, lines: LineSet, carrier: int) -> tuple[Integers, Integers, Booleans]:
@@ -90,8 +99,8 @@ class UnequalBearings:
         np.add.at(found, places, -self.still[there])
         return found if speed > 0.0 else found.conj()
 
-    def at(self, lines: LineSet, carrier: int, speed: float, motion: Complexes) -> tuple[Complexes, Complexes]:
-        """Find generalized forces (n, size) of a motion, and signals (n, r) with those of the static state, at lines.
+    def signals_at(self, lines: LineSet, carrier: int, speed: float, motion: Complexes) -> Complexes:
+        """Find signals (n, r) of a motion, with those of the static state, at lines.
 
         Parameters
         ----------
@@ -105,18 +114,12 @@ class UnequalBearings:
         moving = motion[places][..., self.coordinates] * (places >= 0)[..., None]
         moving = np.where(mirrored[..., None], moving.conj(), moving)
         rates = 1j * abs(speed) * (rows @ lines.bases)[..., None] * moving
-
-        def of(by_place: Complexes, by_rate: Complexes) -> Complexes:
-            slopes = (by_place, by_rate) if speed > 0.0 else (by_place.conj(), by_rate.conj())
-            return np.asarray(sum(np.einsum("tab,tnb->na", a, x) for a, x in zip(slopes, (moving, rates), strict=True)))
-
-        forces = np.zeros_like(motion)
-        forces[:, self.coordinates] = of(self.stiffness, self.damping)
-        signals = of(self.signals_stiffness, self.signals_damping)
-        still = self.signals_still if speed > 0.0 else self.signals_still.conj()
-        np.add.at(signals, places_still, still[there])
-        forces[0], signals[0] = forces[0].real, signals[0].real
-        return forces, signals
+        slopes = self.signals_still, self.signals_stiffness, self.signals_damping
+        still, by_place, by_rate = slopes if speed > 0.0 else (own.conj() for own in slopes)
+        found = np.einsum("trc,tnc->nr", by_place, moving) + np.einsum("trc,tnc->nr", by_rate, rates)
+        np.add.at(found, places_still, still[there])
+        found[0] = found[0].real
+        return np.asarray(found)
 
 
 def varying_bearings(system: MeanSystem) -> UnequalBearings | None:
@@ -162,7 +165,8 @@ def unequal_bearings(assembly: Assembly, system: MeanSystem, planets: PlanetSet)
     if all(np.array_equal(own, getattr(equal, name)) for name, own in laws.items()):
         return None
     both = equal._replace(**laws), equal
-    return _series(system, both, planets, numbers, 4 * (planets.waves // 2 + 1) + 1)
+    found = _series(system, both, planets, numbers, 4 * (planets.waves // 2 + 1) + 1)
+    return found if found.turns.size else None
 
 
 def _series(

@@ -138,7 +138,7 @@ def torque_of_stated_loads(model, response):
     own = response.interface
     if not len(model.shaft_orders.loads.order):
         return 0.0
-    return model.with_following_loads(own, response.motion).loads.torque - own.loads.torque
+    return model.with_turned_loads(own, response.motion).loads.torque - own.loads.torque
 
 
 def torque_of_errors(model, response):
