@@ -111,7 +111,7 @@ def _rpm(speed: float) -> str:
 
 def _balance(data: xr.Dataset) -> Iterator[Finding]:
     """Energy and stability of the steady state."""
-    error = float(np.nanmax(data["energy_error"]))
+    error = float(np.nanmax(np.abs(data["energy_error"])))
     text = f"energy balance closed to {100.0 * error:.1g} % (power supplied by the meshes = power dissipated)"
     yield check_finding(error < MAX_ENERGY_ERROR, text, error)
     growth = float(data.attrs["growth_rate"])

@@ -235,7 +235,7 @@ def _response_row(data: xr.Dataset) -> dict[str, object]:
         "highest speed / rpm": f"{speed.max():.1f}",
         "orders": data.sizes["line"] - 1,
         "not converged": len(json.loads(data.attrs["not_converged"])),
-        "largest error of the power balance": f"{float(np.nanmax(data['energy_error'])):.1e}",
+        "largest error of the power balance": f"{float(np.nanmax(np.abs(data['energy_error']))):.1e}",
         "largest growth rate of a disturbance / (1/s)": f"{float(data.attrs['growth_rate']):.3g}",
     }
 
