@@ -177,7 +177,7 @@ def check_law(name: str, method: Method) -> None:
 
 
 def check_nonlinear(gearbox: Gearbox, method: Method) -> None:
-    """Refuse trains without meshes with models evaluated in time.
+    """Refuse the method ``nonlinear`` for trains without meshes.
 
     Raises
     ------

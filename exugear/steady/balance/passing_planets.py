@@ -273,9 +273,10 @@ class PlanetBearings:
         at = model.bearing_coordinates
         self._own = interface.along_bearings[:, at]
         self._lengths = model.bearing_lengths
-        self._forces = BearingForces(model, interface, model.unequal_bearings)
-        self._passing = None
-        if not model.loaded_bearings:
+        self._passing = self._forces = None
+        if model.loaded_bearings:
+            self._forces = BearingForces(model, interface, model.unequal_bearings)
+        else:
             self._passing = PassingPlanets(model, interface, [self.part(model, interface)], self._own)
         still = model.still_bearings(interface.speed)
         loads = 0.0 if interface.loads is None else interface.loads.motion[:, at]
@@ -298,10 +299,12 @@ class PlanetBearings:
 
     def _varying(self, motion: Complexes) -> Complexes:
         """Return the forces (n, c) S q where the averaged system without them moves by (n, c)."""
-        if self._passing is not None:
+        forces = self._forces
+        if forces is None:
+            assert self._passing is not None
             return self._passing.forces(self._passing.solve(motion))
 
         def apply(scaled: Complexes) -> Complexes:
-            return scaled + self._lengths * (self._own @ self._forces(scaled / self._lengths)[..., None])[..., 0]
+            return scaled + self._lengths * (self._own @ forces(scaled / self._lengths)[..., None])[..., 0]
 
-        return self._forces(solve_lines(apply, self._lengths * motion, BEARINGS_TOLERANCE)[0] / self._lengths)
+        return forces(solve_lines(apply, self._lengths * motion, BEARINGS_TOLERANCE)[0] / self._lengths)
