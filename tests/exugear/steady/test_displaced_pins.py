@@ -272,6 +272,15 @@ def test_planets_that_share_the_load_very_unequally_are_in_balance(method):
         assert taken == pytest.approx(given, rel=1e-5)
 
 
+def test_displaced_pins_of_constant_stiffness_are_not_said_to_leave_all_amplitudes_at_zero():
+    """A pin displaced along the tangent loads bearings at the order of the carrier; the overall error stays."""
+    pins = {"late": {"body": "planet_1", "tangential_um": 20.0}}
+    assembly = train(gear_trains.planetary("ring"), pins, shape=np.ones(1))
+    data = to_dataset(response_of(assembly, SteadySettings(SpeedRange(20.0, 40.0, 3), at_resonances=False)))
+    (said,) = [own.text for own in response_findings(data) if own.text.startswith("no excitation")]
+    assert "the overall transmission error does not vary" in said
+
+
 def test_a_response_warns_of_rolling_elements_that_are_loaded_unequally(grc, stiffness):
     said = {}
     for name, pins in (("without", {}), ("late", LATE)):
