@@ -368,7 +368,7 @@ def frequencies_over_angle(system: MeanSystem, tracks: ModeTracks) -> Floats:
     stiffness does not vary.
     """
     found = np.ones((tracks.frequency.shape[1], 2))
-    if system.over_angle is None:
+    if not system.over_angles:
         return found
     middle = len(tracks.speeds) // 2
     held = [mean_modes(one, float(tracks.speeds[middle]))[0].imag for one in system.at_angles()]

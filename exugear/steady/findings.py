@@ -14,7 +14,14 @@ from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.results.findings import Finding, check_finding
 from exugear.results.sound.over_speed import sound_over_speed
-from exugear.steady.peaks import STRAINED, bearing_swings, dynamic_load_ratios, pulls, tensile_fractions
+from exugear.steady.peaks import (
+    STRAINED,
+    bearing_swings,
+    dynamic_load_ratios,
+    pulls,
+    tensile_fractions,
+    varying_carriers,
+)
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from exugear.system.tooth_mesh.tables import Shuttling
 from fe_ste.tools.arrays import Floats
@@ -188,7 +195,7 @@ def _models(data: xr.Dataset) -> Iterator[Finding]:
             f"dynamic load of bearings over {100.0 * STRAINED:.0f} % of their static load ({'; '.join(loads)}{more}): "
         )
         # Rolling elements of planets that are not alike are evaluated by runs alone.
-        way = "exugear run" if data.attrs.get("varying_carrier") else "--method nonlinear"
+        way = "exugear run" if varying_carriers(data) else "--method nonlinear"
         text += f'outside the linear range, peaks there are too high; set model = "iso16281" and use {way}'
         yield Finding("warning", text, swings[0].share)
     variation = float(data.attrs["stiffness_variation"])
@@ -200,13 +207,16 @@ def _models(data: xr.Dataset) -> Iterator[Finding]:
 
 def _passing(data: xr.Dataset) -> Iterator[Finding]:
     """Orders beside others by stiffness that varies with the angle of a carrier."""
-    carrier = str(data.attrs.get("varying_carrier", ""))
-    if not carrier:
+    carriers = varying_carriers(data)
+    if not carriers:
         return
     left_out = float(data.attrs["neighbours_left_out"])
-    passing = data["index"].to_numpy()[:, list(data["base"].to_numpy()).index(carrier)]
-    count = int(np.count_nonzero(passing))
-    text = f"stiffness varies with the angle of {carrier}: {count} orders of passing planets and beside mesh orders "
+    passing = data["index"].to_numpy()[:, np.isin(data["base"].to_numpy(), carriers)]
+    count = int(np.count_nonzero(passing.any(axis=1)))
+    several = len(carriers) > 1
+    named = " and ".join(carriers)
+    angles = "angles" if several else "angle"
+    text = f"stiffness varies with the {angles} of {named}: {count} orders of passing planets and beside mesh orders "
     text += "are included; those left out change the transmission error and the deflections of the meshes by at most "
     text += f"{100.0 * left_out:.1g} %"
     yield Finding("warning" if left_out > NOTICED_NEIGHBOURS else "note", text, left_out)
@@ -216,8 +226,9 @@ def _passing(data: xr.Dataset) -> Iterator[Finding]:
         most = int(np.argmax(spread))
         frequency = float(np.nanmean(data["mode_frequency"].to_numpy()[:, most]))
         low, high = (100.0 * np.round(over_angle[most] - 1.0, 6)).tolist()
-        text = f"natural frequencies are those with {carrier} at zero angle; as it turns, they vary from {low:.2g} to "
-        text += f"{high:+.2g} % at most (mode at {frequency:.0f} Hz)"
+        turning = "one of them" if several else "it"
+        text = f"natural frequencies are those with {named} at zero {angles}; as {turning} turns, they vary from "
+        text += f"{low:.2g} to {high:+.2g} % at most (mode at {frequency:.0f} Hz)"
         yield Finding("note", text, float(spread[most]))
 
 
@@ -240,7 +251,7 @@ def _excitation(data: xr.Dataset) -> Iterator[Finding]:
     else:
         yield Finding("note", f"{harmonics} mesh harmonics; harmonics that a solution requires are added")
     if shared := str(data.attrs["shared_lines"]):
-        yield Finding("note", f"coinciding orders of several meshes, each named after one of them: {shared}")
+        yield Finding("note", f"coinciding orders, each named after one of them: {shared}")
 
 
 def _sound(data: xr.Dataset) -> Iterator[Finding]:

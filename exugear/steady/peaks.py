@@ -124,6 +124,11 @@ def _tops(values: Floats) -> Integers:
     return standing_peaks(values)
 
 
+def varying_carriers(data: xr.Dataset) -> tuple[str, ...]:
+    """Carriers with whose angles stiffness varies, as a file of a response names them."""
+    return tuple(str(data.attrs.get("varying_carrier", "")).split(", ")) if data.attrs.get("varying_carrier") else ()
+
+
 def sidebands(data: xr.Dataset, peak: Peak, least: float = 0.01) -> tuple[Sideband, ...]:
     """Return orders of the overall transmission error beside that of a peak, largest first.
 
@@ -140,7 +145,7 @@ def sidebands(data: xr.Dataset, peak: Peak, least: float = 0.01) -> tuple[Sideba
     names = [str(name) for name in data["signal"].to_numpy()]
     values: Floats = data["amplitude"].to_numpy()[point, :, names.index("overall_dte")].astype(np.float64)
     # Passing planets are beside what a mesh excites, however many times they pass.
-    of_meshes = np.array([base != data.attrs.get("varying_carrier") for base in bases])
+    of_meshes = np.array([base not in varying_carriers(data) for base in bases])
     carrying = int(np.argmax(np.abs(index[centre]) * of_meshes))
     found = []
     for line in range(1, len(index)):

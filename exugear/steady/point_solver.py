@@ -13,6 +13,7 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -41,7 +42,7 @@ from exugear.steady.mean_system.carrier_stability import growth_over_carrier
 from exugear.steady.mean_system.mean_system import Steps, mean_system
 from exugear.steady.mean_system.mesh_places import BACK, DEFLECTION, POSITION
 from exugear.steady.mean_system.mesh_waves import FEWEST, mesh_waves
-from exugear.steady.mean_system.shaft_orders import any_shaft_orders, shaft_orders, without_deviations
+from exugear.steady.mean_system.shaft_orders import PassingMotion, any_shaft_orders, shaft_orders, without_deviations
 from exugear.steady.settings import Method
 from exugear.steady.settling import SettlingRun, SettlingSegment, cannot_settle
 from exugear.system.system import Assembly
@@ -100,7 +101,7 @@ def harmonic_balance_model(
     usual = FEWEST if LAWS[assembly.mesh_model].loses_contact else waves.needed_harmonics()
     count = usual if harmonics is None else harmonics
     moved = None
-    if waves.varying_carrier and any_shaft_orders(assembly):
+    if waves.varying_carriers and any_shaft_orders(assembly):
         moved = _passing_motion(HarmonicBalanceModel(waves, count, combinations))
     orders = shaft_orders(assembly, waves, moved)
     if method == "linear":
@@ -108,14 +109,24 @@ def harmonic_balance_model(
     return HarmonicBalanceModel(waves, count, combinations, orders)
 
 
-def _passing_motion(model: HarmonicBalanceModel) -> Callable[[float], Floats]:
-    """Return the motion (size,) that passing planets cause at an angle of the input (rad), at the middle speed."""
+def _passing_motion(model: HarmonicBalanceModel) -> PassingMotion:
+    """Return the motion that the passing planets of each carrier cause, at the middle speed."""
     speeds = model.system.speeds
     speed = float(speeds[1] or speeds[2])
-    motion = parametric_response(model, model.at(speed)).motion.copy()
-    motion[model.lines.index[:, : len(model.waves.base_orders)].any(axis=1)] = 0.0
+    motion = parametric_response(model, model.at(speed)).motion
     bases = math.copysign(1.0, speed) * model.lines.bases
-    return lambda psi: model.lines.values(motion, psi * bases[None])[0]
+
+    def moved(own: Complexes, psi: float) -> Floats:
+        found: Floats = model.lines.values(own, psi * bases[None])[0]
+        return found
+
+    found: dict[str, Callable[[float], Floats]] = {}
+    for carrier in model.waves.varying_carriers:
+        others = np.delete(model.lines.index, model.base_names.index(carrier), axis=1).any(axis=1, keepdims=True)
+        own = np.where(others, 0.0, motion)
+        own[0] *= not found
+        found[carrier] = partial(moved, own)
+    return found
 
 
 @dataclass(frozen=True, eq=False)

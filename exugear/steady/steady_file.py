@@ -163,7 +163,7 @@ def _attributes(response: SteadyResponse) -> dict[str, Any]:
         "growth_rate": response.growth_rate,
         "near_unconverged_states": ", ".join(meshes_near_unconverged(assembly)),
         "planet_spread": response.planet_spread,
-        "varying_carrier": response.varying_carrier,
+        "varying_carrier": ", ".join(response.varying_carriers),
         "load_sharing": json.dumps(response.load_sharing),
         "neighbours_left_out": response.neighbours_left_out,
         "stiffness_variation": response.stiffness_variation,

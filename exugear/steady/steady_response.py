@@ -234,8 +234,8 @@ class SteadyResponse(ReprMixin):
     growth_rate: float
     """Largest growth rate of any disturbance over the speeds, 1/s: of the averaged system at combination resonances of
     two modes and a mesh frequency, and of the points with contact loss."""
-    varying_carrier: str
-    """Carrier with whose angle stiffness varies: its planets pass a flexible ring gear, or are not alike."""
+    varying_carriers: tuple[str, ...]
+    """Carriers with whose angles stiffness varies: their planets pass a flexible ring gear, or are not alike."""
     neighbours_left_out: float
     """Largest relative change of transmission error and mesh deflections by the orders left out beside others."""
     planet_spread: float
@@ -398,7 +398,7 @@ def response_of(
         folds=folds,
         branch_ended=ended,
         growth_rate=float(np.fmax.reduce(solved.growth, initial=growth)),
-        varying_carrier=model.waves.varying_carrier,
+        varying_carriers=model.waves.varying_carriers,
         neighbours_left_out=neglected,
         planet_spread=model.system.planet_spread,
         stiffness_variation=model.system.variation,

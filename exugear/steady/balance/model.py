@@ -120,7 +120,7 @@ class HarmonicBalanceModel:
         # Shared by all that differ in their lines alone.
         self._lattices: dict[tuple[HarmonicTruncation, int, int, int], TorusSampling] = {}
         self._one_by_one: dict[int, HarmonicBalanceModel] = {}
-        self._varying_bearings: list[UnequalBearings | None] = []
+        self._varying_bearings: list[tuple[UnequalBearings, ...]] = []
         self.bearings: BearingWaves | None = None
         self._bearing_means: tuple[BearingMean, ...] = ()
         ports = []
@@ -328,13 +328,12 @@ class HarmonicBalanceModel:
         slow = self.shaft_orders
         sidebands = slow.sidebands + (slow.products if products else ())
         meshes = len(waves.base_orders)
-        planets = next((family.planets for family in self.varying if family.planets is not None), None)
-        if planets is None:
+        if not self.varying:
             lines = beside(lines, modulators, 0) if waves.passing else modulated(lines, modulators)
             return with_rotations(lines, slow.rotations, sidebands, meshes, reach.harmonics)
         most = waves.neighbours if neighbours is None else neighbours
-        lines = modulated(lines, modulators, planets.in_steps(most))
-        most = planets.in_steps(min(most, SHAFT_NEIGHBOURS))
+        lines = modulated(lines, modulators, most)
+        most = min(most, SHAFT_NEIGHBOURS)
         return with_rotations(lines, slow.rotations, sidebands, meshes, reach.harmonics, modulators, most)
 
     @cached_property
@@ -460,7 +459,7 @@ class HarmonicBalanceModel:
 
     @property
     def varying(self) -> tuple[Family, ...]:
-        """Families with more waves than planets, on one carrier: see `MeshWaves.varying_carrier`."""
+        """Families with more waves than planets: see `MeshWaves.varying_carriers`."""
         return tuple(own for own in self.families if own.planets is not None and own.count > own.planets.waves)
 
     @cached_property
@@ -472,10 +471,11 @@ class HarmonicBalanceModel:
         return found
 
     @property
-    def varying_bearings(self) -> UnequalBearings | None:
-        """What bearings of planets that are not alike have beyond the averaged system; None without any."""
+    def varying_bearings(self) -> tuple[UnequalBearings, ...]:
+        """What bearings of planets that are not alike have beyond the averaged system, by carrier."""
         if not self._varying_bearings:
-            self._varying_bearings.append(varying_bearings(self.system))
+            found = [varying_bearings(self.system, carrier) for carrier in self.waves.varying_carriers]
+            self._varying_bearings.append(tuple(own for own in found if own is not None))
         return self._varying_bearings[0]
 
     @cached_property
@@ -486,8 +486,7 @@ class HarmonicBalanceModel:
     @cached_property
     def unequal_bearings(self) -> tuple[UnequalBearings, ...]:
         """All bearings that differ from planet to planet: `loaded_bearings`, then `varying_bearings`."""
-        varying = self.varying_bearings
-        return self.loaded_bearings if varying is None else (*self.loaded_bearings, varying)
+        return *self.loaded_bearings, *self.varying_bearings
 
     @cached_property
     def bearing_coordinates(self) -> Integers:

@@ -52,7 +52,10 @@ def with_needed_neighbours(
     model : with the lines of the meshes, of passing planets, and the relevant ones beside them
     changed : largest relative change of overall transmission error and deflections of the meshes by what is left out
     """
-    beside = model.beside_others & np.delete(model.lines.index, model.varying[0].carrier, axis=1).any(axis=1)
+    carriers = list({family.carrier for family in model.varying})
+    passing = ~np.delete(model.lines.index, carriers, axis=1).any(axis=1)
+    passing &= np.count_nonzero(model.lines.index[:, carriers], axis=1) < 2
+    beside = model.beside_others & ~passing
     whole = _vibrations(model, speeds, prepared)
     carry = np.array([np.linalg.norm(motion[:, 1:], axis=1) for motion, _ in whole])
     push = np.array([np.linalg.norm(forces, axis=1) for _, forces in whole])

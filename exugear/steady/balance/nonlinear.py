@@ -17,6 +17,8 @@ from exugear.steady.balance.passing_planets import (
     PassingPlanets,
     PlanetBearings,
     VaryingPart,
+    bearing_parts,
+    by_carrier,
     carried_readings,
 )
 from exugear.steady.balance.response import Response, rates_of
@@ -455,10 +457,13 @@ class Tangent:
 
         def solved(wanted: Complexes) -> Complexes:
             found = self.alone(wanted)
-            if passing is not None:
+            if passing:
                 rest = np.zeros((len(found), self._passing_bearings), dtype=complex)
                 flat = found.reshape(len(found), -1)
-                found = passing.solve(np.hstack([flat, rest]))[:, : flat.shape[1]].reshape(found.shape)
+                own = np.hstack([flat, rest])
+                for carrier in passing:
+                    own = carrier.solve(own)
+                found = own[:, : flat.shape[1]].reshape(found.shape)
             return lengths * found
 
         def apply(scaled: Complexes) -> Complexes:
@@ -477,21 +482,19 @@ class Tangent:
     @property
     def _passing_bearings(self) -> int:
         """Number of the coordinates of bearings in `_passing`: those of planets that are not alike."""
-        bearings = self.balance.model.varying_bearings
-        return 0 if bearings is None else len(bearings.coordinates)
+        return sum(len(own.coordinates) for own in self.balance.model.varying_bearings)
 
     @cached_property
-    def _passing(self) -> PassingPlanets | None:
-        """Coupling of lines by the slopes of the laws in their mean over time; None where nothing varies."""
+    def _passing(self) -> tuple[PassingPlanets, ...]:
+        """Coupling of lines by the slopes of the laws in their mean over time, for each carrier that varies them."""
         balance = self.balance
         model, interface = balance.model, balance.interface
         if not model.varying:
-            return None
+            return ()
         n, m, r = balance.static.shape
         f = interface.ports.forces.shape[1]
         means = np.array(balance.places.means)
         parts = []
-        columns: list[int] = []
         for family in model.varying:
             of_places = means == family.first
             slope, damping = (
@@ -499,21 +502,24 @@ class Tangent:
             )
             stiffness, damper = (slopes_over_turn(family, values, interface.speed) for values in (slope, damping))
             stiffness[family.turns] = 0.0  # the mean is in what each line answers by itself
-            own = slice(r * family.first, r * (family.first + family.count))
-            parts.append(VaryingPart(own, stiffness, damper, carried_readings(model, interface.speed, family, r)))
-            columns += range(f * family.first, f * (family.first + family.count))
-        forces = np.array(columns)
-        answers = interface.readings.reshape(n, m * r, m * f)[:, :, forces]
-        if model.varying_bearings is not None:
-            parts.append(PlanetBearings.part(model, interface, m * r))
-            at = model.varying_bearings.coordinates
-            moved = interface.motion[:, at].reshape(n, len(at), m * f)[:, :, forces]
+            own, forces = (slice(size * family.first, size * (family.first + family.count)) for size in (r, f))
+            carried = carried_readings(model, interface.speed, family, r)
+            parts.append(VaryingPart(family.carrier, own, forces, stiffness, damper, carried))
+        answers = interface.readings.reshape(n, m * r, m * f)
+        if model.varying_bearings:
+            at = np.concatenate([bearings.coordinates for bearings in model.varying_bearings])
+            moved = interface.motion[:, at].reshape(n, len(at), m * f)
             along = interface.along_bearings[..., -len(at) :]
             read_there = balance.along_bearings[..., -len(at) :].reshape(n, m * r, -1)
             answers = np.block([[answers, read_there], [moved, along[:, at]]])
+            parts += bearing_parts(model, interface.speed, *answers.shape[1:])
         read = balance.read
-        answers[:, read] = self._inverse @ answers[:, read]
-        return PassingPlanets(model, interface, parts, answers)
+        found = []
+        for of_carrier, columns in by_carrier(parts):
+            along_forces = answers[:, :, columns]
+            along_forces[:, read] = self._inverse @ along_forces[:, read]
+            found.append(PassingPlanets(model, interface, of_carrier, along_forces))
+        return tuple(found)
 
     @cached_property
     def _inverse(self) -> Complexes:

@@ -60,10 +60,14 @@ class SolvedGroups(NamedTuple):
 
 
 class VaryingPart(NamedTuple):
-    """What couples the s readings of some meshes or bearings at multiples of the carrier's angle, from -t to t."""
+    """What couples the s readings of some meshes or bearings at multiples of a carrier's angle, from -t to t."""
 
+    carrier: int
+    """Its place among the bases."""
     readings: slice
     """Among all readings."""
+    forces: slice
+    """Among all forces."""
     stiffness: Complexes
     damping: Complexes
     """(2 t + 1, f, s) of f forces, by the readings and by their rates."""
@@ -72,7 +76,7 @@ class VaryingPart(NamedTuple):
 
 
 class PassingPlanets:
-    """Coupling of lines by stiffness that varies with the carrier at one speed; n lines, k readings, s that vary.
+    """Coupling of lines by stiffness that varies with one carrier at one speed; n lines, k readings, s that vary.
 
     Parameters
     ----------
@@ -85,10 +89,8 @@ class PassingPlanets:
     ) -> None:
         self._lines = model.lines
         self._frequencies = interface.frequencies
-        planets = model.varying[0].planets
-        assert planets is not None
-        self._step = planets.passing
-        self._carrier = model.varying[0].carrier
+        self._carrier = parts[0].carrier
+        self._step = model.waves.carriers[self._carrier - len(model.waves.base_orders)][1].passing
         self._turns = max(len(part.stiffness) for part in parts) // 2
         self._at = np.concatenate([np.arange(part.readings.start, part.readings.stop) for part in parts])
         self._carried = scipy.linalg.block_diag(*(part.carried for part in parts))
@@ -135,7 +137,7 @@ class PassingPlanets:
         passing = np.zeros(index.shape[1], dtype=np.int64)
         passing[self._carrier] = step
         first = self._first_of_groups()
-        reach = 2 * int(np.abs(index[:, self._carrier]).max()) // step
+        reach = 2 * int(np.abs(index @ self._units).max()) // (step * int(self._units[self._carrier]))
         rows = index[first, None, :] + np.arange(-reach, reach + 1)[:, None] * passing
         places, mirrored = self._lines.find(rows)
         speed = self._frequencies[-1] / self._lines.orders[-1]
@@ -147,15 +149,20 @@ class PassingPlanets:
             apart = step * (member[:, :, None] - member[:, None, :])
             yield self._solved(stiffness, answers, own, frequencies[group, member], apart)
 
+    @property
+    def _units(self) -> Integers:
+        """Multiples (bases,) of the frequency that the carrier has in common with other bases."""
+        units = self._lines.units
+        return units[:, int(np.flatnonzero(units[self._carrier])[0])]
+
     def _first_of_groups(self) -> Integers:
         """First line of each group: lines are alike but for planet passages, those turned round among them."""
         lines = self._lines
         units = lines.index @ lines.units
-        column = int(np.flatnonzero(lines.units[self._carrier])[0])
-        turns = units[:, column].copy()
-        units[:, column] = 0
+        turns = lines.index @ self._units
+        units[:, lines.units[self._carrier] != 0] = 0
         leading = units[np.arange(len(units)), np.argmax(units != 0, axis=1)]
-        step = self._step
+        step = self._step * int(self._units[self._carrier])
         turns = np.where(leading < 0, -turns, turns) % step
         turns = np.where(leading == 0, np.minimum(turns, -turns % step), turns)
         keys = np.column_stack([np.where(leading < 0, -1, 1)[:, None] * units, turns])
@@ -210,8 +217,8 @@ def passing_planets(
     functions: Sequence[Complexes],
     answers: Complexes,
     lengths: Floats,
-) -> PassingPlanets:
-    """Coupling of lines where laws along a row are tangents, with forces along the readings.
+) -> tuple[PassingPlanets, ...]:
+    """Coupling of lines by each carrier where laws along a row are tangents, with forces along the readings.
 
     Parameters
     ----------
@@ -230,12 +237,31 @@ def passing_planets(
         over_cycle = whole.reshape(-1, 2 * family.turns + 1, *whole.shape[1:])
         own = slice(forces * family.first, forces * (family.first + family.count))
         carried = carried_readings(model, interface.speed, family, forces)
-        parts.append(VaryingPart(own, over_cycle[len(over_cycle) // 2], of_damper / lengths[own], carried))
-    if model.varying_bearings is not None:
-        part = PlanetBearings.part(model, interface, answers.shape[1] - len(model.varying_bearings.coordinates))
-        parts.append(part._replace(stiffness=functions[-1], damping=part.damping / lengths[part.readings]))
-    at = np.concatenate([np.arange(part.readings.start, part.readings.stop) for part in parts])
-    return PassingPlanets(model, interface, parts, answers[..., at])
+        damping = of_damper / lengths[own]
+        parts.append(VaryingPart(family.carrier, own, own, over_cycle[len(over_cycle) // 2], damping, carried))
+    of_bearings = bearing_parts(model, interface.speed, *answers.shape[1:])
+    for part, stiffness in zip(of_bearings, functions[len(functions) - len(of_bearings) :], strict=True):
+        parts.append(part._replace(stiffness=stiffness, damping=part.damping / lengths[part.readings]))
+    return tuple(PassingPlanets(model, interface, own, answers[..., at]) for own, at in by_carrier(parts))
+
+
+def by_carrier(parts: Sequence[VaryingPart]) -> Iterator[tuple[list[VaryingPart], Integers]]:
+    """Parts of each carrier, and the places of their forces (f,) among all."""
+    for carrier in dict.fromkeys(part.carrier for part in parts):
+        own = [part for part in parts if part.carrier == carrier]
+        yield own, np.concatenate([np.arange(part.forces.start, part.forces.stop) for part in own])
+
+
+def bearing_parts(model: HarmonicBalanceModel, speed: float, readings: int, forces: int) -> list[VaryingPart]:
+    """Return what couples the coordinates of bearings of planets that are not alike: last of readings and forces."""
+    found: list[VaryingPart] = []
+    for own in reversed(model.varying_bearings):
+        count = len(own.coordinates)
+        at = slice(readings - count, readings), slice(forces - count, forces)
+        carrier = model.base_names.index(own.carrier)
+        found.insert(0, VaryingPart(carrier, *at, *own.functions_at(speed), np.zeros((count, count))))
+        readings, forces = readings - count, forces - count
+    return found
 
 
 def carried_readings(model: HarmonicBalanceModel, speed: float, family: Family, readings: int) -> Floats:
@@ -277,21 +303,13 @@ class PlanetBearings:
         if model.loaded_bearings:
             self._forces = BearingForces(model, interface, model.unequal_bearings)
         else:
-            self._passing = PassingPlanets(model, interface, [self.part(model, interface)], self._own)
+            parts = bearing_parts(model, interface.speed, len(at), len(at))
+            self._passing = PassingPlanets(model, interface, parts, self._own)
         still = model.still_bearings(interface.speed)
         loads = 0.0 if interface.loads is None else interface.loads.motion[:, at]
         self._of_meshes = interface.motion[:, at].reshape(len(self._own), len(at), -1)
         self.given = still + self._varying(loads - (self._own @ still[..., None])[..., 0])
         """(n, c) forces where laws have none beyond the averaged system."""
-
-    @staticmethod
-    def part(model: HarmonicBalanceModel, interface: Interface, first: int = 0) -> VaryingPart:
-        """Return what couples the coordinates, which are readings from a first one on."""
-        bearings = model.varying_bearings
-        assert bearings is not None
-        count = len(bearings.coordinates)
-        stiffness, damping = bearings.functions_at(interface.speed)
-        return VaryingPart(slice(first, first + count), stiffness, damping, np.zeros((count, count)))
 
     def forces(self, excess: Complexes) -> Complexes:
         """Return the forces (n, c) that laws' forces (n, m, f) beyond the averaged system cause, without `given`."""

@@ -15,6 +15,7 @@ Deviations of gears are a given displacement in both methods: see `exugear.stead
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -150,7 +151,7 @@ def mean_deviation_forces(model: HarmonicBalanceModel, speed: float) -> Complexe
 
 
 def deviation_forces(
-    model: HarmonicBalanceModel, interface: Interface, passing: PassingPlanets | None = None
+    model: HarmonicBalanceModel, interface: Interface, passing: Sequence[PassingPlanets] = ()
 ) -> Complexes:
     """Find the forces (n, m, f) of the deviations of gears, -k e - c e' with k over the mesh cycle, N and N m.
 
@@ -166,9 +167,9 @@ def deviation_forces(
     beyond = model.coupling.of(
         model.cycles.tangents_beyond_mean.at(ports, interface.speed), errors.reshape(len(errors), -1)
     )
-    if passing is not None:
-        readings = np.hstack([errors.reshape(len(errors), -1), np.zeros((len(errors), len(model.bearing_lengths)))])
-        beyond += passing.damper_forces(readings)[:, : beyond.shape[1]]
+    readings = np.hstack([errors.reshape(len(errors), -1), np.zeros((len(errors), len(model.bearing_lengths)))])
+    for own in passing:
+        beyond += own.damper_forces(readings)[:, : beyond.shape[1]]
     return forces - beyond.reshape(forces.shape)
 
 
@@ -316,7 +317,7 @@ class LineBalance:
     ----------
     answers : (n, k, k) readings of each line under a unit of each force, G
     lengths : (k,) what a reading counts as a length
-    passing : of stiffness that varies with the carrier, at any positions in the mesh cycle; by default it is found
+    passing : of stiffness that varies with carriers, at any positions in the mesh cycle; by default it is found
     """
 
     def __init__(
@@ -325,7 +326,7 @@ class LineBalance:
         interface: Interface,
         answers: Complexes,
         lengths: Floats,
-        passing: PassingPlanets | None = None,
+        passing: tuple[PassingPlanets, ...] = (),
     ) -> None:
         functions = model.cycles.tangents_beyond_mean.at(interface.ports, interface.speed)
         of_bearings = [own.functions_at(interface.speed) for own in model.unequal_bearings]
@@ -341,7 +342,7 @@ class LineBalance:
         self._memory = self._coupling.memory()
         self._octets = np.empty(2 * SIZE)
         self.passing = passing
-        if model.varying and passing is None:
+        if model.varying and not passing:
             self.passing = passing_planets(model, interface, self._functions, answers, lengths)
         self._loaded = BearingForces(model, interface, model.loaded_bearings) if model.loaded_bearings else None
         begin = len(lengths) - len(model.bearing_lengths)
@@ -351,13 +352,21 @@ class LineBalance:
     def _apply(self, readings: Complexes) -> Complexes:
         out = np.empty_like(readings)
         add_answered(cached_bundle(self._coupling.terms), *self._parts, readings, *self._memory, self._octets, out)
-        if not (self._loaded is None and self.passing is None):
+        if self._loaded is not None or self.passing:
             out += (self._answers @ self._dampers(readings)[..., None])[..., 0]
-        return out if self.passing is None else self.passing.solve(out)
+        return self._without_passing(out)
+
+    def _without_passing(self, readings: Complexes) -> Complexes:
+        """Solve what the passing planets of each carrier couple, one carrier after the other: a preconditioner."""
+        for own in self.passing:
+            readings = own.solve(readings)
+        return readings
 
     def _dampers(self, readings: Complexes) -> Complexes:
         """Return the forces (n, k) of dampers that are unequal or vary, beyond those of the averaged system."""
-        found = np.zeros_like(readings) if self.passing is None else self.passing.damper_forces(readings)
+        found = np.zeros_like(readings)
+        for passing in self.passing:
+            found += passing.damper_forces(readings)
         if self._loaded is not None:
             own = self._at_loaded
             found[:, own] += self._loaded.of_dampers(readings[:, own] / self._lengths[own])
@@ -369,8 +378,8 @@ class LineBalance:
 
     def solve(self, right: Complexes, start: Complexes | None) -> tuple[Complexes, int]:
         """Solve for readings (n, k); the products with K that it took follow."""
-        given = right if self.passing is None else self.passing.solve(right)
-        return solve_lines(self._apply, given, TOLERANCE if self.passing is None else PASSING_TOLERANCE, start)
+        tolerance = PASSING_TOLERANCE if self.passing else TOLERANCE
+        return solve_lines(self._apply, self._without_passing(right), tolerance, start)
 
 
 def at_mean_positions(model: HarmonicBalanceModel, interface: Interface, response: Response) -> Interface:

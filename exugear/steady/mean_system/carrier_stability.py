@@ -32,21 +32,24 @@ MODES = 40
 def growth_over_carrier(system: MeanSystem, speed: float) -> float:
     """Return the fastest growth of a disturbance at a speed of the input (rad/s) other than zero, 1/s.
 
-    Free rolling is left out. Stiffness has to vary with the angle of the carrier: `MeanSystem.over_angle`.
+    Free rolling is left out. Stiffness has to vary with the angle of a carrier: `MeanSystem.over_angles`. Where it
+    varies with those of several, it is the fastest growth with one of them, the others at their mean.
     """
-    assert system.over_angle is not None
-    places = system.frame.places
-    period = float(places[1] * len(places)) / abs(speed)
     basis = np.eye(system.size)
     if system.size > LARGEST:
         stiffness = system.stiffness_at(speed)
         basis = scipy.linalg.eigh(0.5 * (stiffness + stiffness.T), system.mass, subset_by_index=(0, MODES - 1))[1]
     mass = basis.T @ system.mass @ basis
-    dampings, stiffnesses = system.over_angle[0], system.at(system.over_angle[1], speed)
-    dampings = basis.T @ (system.damping_at(speed) + dampings - dampings.mean(axis=0)) @ basis
-    stiffnesses = basis.T @ (system.stiffness_at(speed) + stiffnesses - stiffnesses.mean(axis=0)) @ basis
-    found, shapes = exponents_of_turning(mass, dampings, stiffnesses, math.copysign(period, speed))
-    return float(np.delete(found, most_rolling(system, basis @ shapes)).real.max())
+    growths = []
+    for carrier, (dampings, at_speeds) in zip(system.frame.varying_carriers, system.over_angles, strict=True):
+        places = system.frame.places_of(carrier)
+        period = float(places[1] * len(places)) / speed
+        stiffnesses = system.at(at_speeds, speed)
+        dampings = basis.T @ (system.damping_at(speed) + dampings - dampings.mean(axis=0)) @ basis
+        stiffnesses = basis.T @ (system.stiffness_at(speed) + stiffnesses - stiffnesses.mean(axis=0)) @ basis
+        found, shapes = exponents_of_turning(mass, dampings, stiffnesses, period)
+        growths.append(float(np.delete(found, most_rolling(system, basis @ shapes)).real.max()))
+    return max(growths)
 
 
 def exponents_of_turning(

@@ -92,9 +92,9 @@ class MeanSystem(ReprMixin):
     variation: float
     """Largest change of stiffness over the carrier's places, over the stiffness: its mean is taken. What a flexible
     ring gear and planets that are not alike bring is left out of it: their meshes are waves around the carrier."""
-    over_angle: tuple[Floats, Floats] | None = None
-    """C (p, size, size) and K (3, p, size, size) less those at zero angle of the carrier, at p of its angles that are
-    evenly spread over the passing of a planet, or of two; None where they are the mean ones at any angle."""
+    over_angles: tuple[tuple[Floats, Floats], ...] = ()
+    """C (p, size, size) and K (3, p, size, size) less those at zero angle of a carrier, at p of its angles that are
+    evenly spread over the passing of a planet, or of two; for each carrier with whose angle they vary."""
 
     damper_factor: float = 1.0
     """Factor on the dampers of meshes and bearings, which the damping has in it: of another end of its range."""
@@ -114,17 +114,21 @@ class MeanSystem(ReprMixin):
         The frequencies of the averaged system are higher than those at any angle, by 5 % at most in the GRC with a
         flexible ring gear, since it has springs all around the ring.
         """
-        return next(self.at_angles()) if self.over_angle is not None else self
+        return next(self.at_angles()) if self.over_angles else self
 
     def at_angles(self) -> Iterator[MeanSystem]:
-        """Systems with the carrier held at the angles of a planet passage; none where stiffness does not vary."""
-        if self.over_angle is None:
-            return
-        dampings, stiffnesses = self.over_angle
-        damping = self.damping - dampings.mean(axis=0)
-        stiffness = self.stiffness - stiffnesses.mean(axis=1)
-        for place, more in enumerate(dampings):
-            yield replace(self, damping=damping + more, stiffness=stiffness + stiffnesses[:, place], over_angle=None)
+        """Systems with carriers held, one of them at the angles of a planet passage and others at zero angle.
+
+        None where stiffness does not vary. The first is that with all of them at zero angle.
+        """
+        damping, stiffness = self.damping, self.stiffness
+        for dampings, stiffnesses in self.over_angles:
+            damping = damping - dampings.mean(axis=0)
+            stiffness = stiffness - stiffnesses.mean(axis=1)
+        for number, (dampings, stiffnesses) in enumerate(self.over_angles):
+            for place in range(min(number, 1), len(dampings)):
+                held = damping + dampings[place], stiffness + stiffnesses[:, place]
+                yield replace(self, damping=held[0], stiffness=held[1], over_angles=())
 
     @cached_property
     def _parabola(self) -> Floats:
@@ -249,28 +253,33 @@ def mean_system(assembly: Assembly, speeds: Floats, prepared: Steps | None = Non
     torque = 0.0
     rows = []
     # Where stiffness varies with the carrier the static state balances the mean over its places.
-    places = frame.places if frame.varies else np.zeros(1)
     matrix = None
-    total = len(at) + (len(frame.places) - 1 if sets else 0)
+    turned = [(own, frame.places_of(name)) for name, own in frame.by_carrier] or [(frame, frame.places)] * bool(sets)
+    total = len(at) + sum(len(places) - 1 for _, places in turned)
     report = partial(prepared or (lambda words, done, total: None), "linearisation")
     for speed in at:
-        u, torque = _static(frame, places, float(speed), drive, load, u, torque, matrix)
+        u, torque = _static(frame, float(speed), drive, load, u, torque, matrix)
         damping, matrix = tangents(frame, 0.0, float(speed), u)
         rows.append((u, torque, damping, matrix))
         report(len(rows), total)
     static, torques, dampings, stiffnesses = (np.array(values) for values in zip(*rows, strict=True))
     mass = _mass(frame, 0.0, static[1])
     variation = 0.0
-    over_angle = None
-    if sets:
-        changes, variation = _changes_over_places(
-            frame, at, static, (mass, dampings[1], stiffnesses), lambda place: report(len(at) + place, total)
-        )
-        mass = mass + changes[0].mean(axis=0)
+    over_angles = []
+    masses = []
+    done = len(at)
+    here = mass, dampings[1], stiffnesses
+    for own, places in turned:
+        step = partial(lambda before, place: report(before + place, total), done)
+        changes, largest = _changes_over_places(own, places, at, static, here, step)
+        done += len(places) - 1
+        variation = max(variation, largest)
+        masses.append(changes[0].mean(axis=0))
         dampings = dampings + changes[1].mean(axis=0)
         stiffnesses = stiffnesses + changes[2].mean(axis=1)
-        if frame.varies:
-            over_angle = changes[1], changes[2]
+        over_angles.append(changes[1:])
+    if masses:
+        mass = mass + np.mean(masses, axis=0)
     return MeanSystem(
         frame,
         at,
@@ -283,7 +292,7 @@ def mean_system(assembly: Assembly, speeds: Floats, prepared: Steps | None = Non
         pinned,
         max(spread, assembly.planet_spread),
         variation,
-        over_angle,
+        tuple(over_angles) if frame.varying_carriers else (),
     )
 
 
@@ -293,8 +302,8 @@ def rotating_frame(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> RotatingF
     Raises
     ------
     SteadyError
-        A flexible carrier is not symmetric, or has planets of different numbers; stiffness varies with the angle of
-        several carriers; planets that are not alike have nonlinear bearings.
+        A flexible carrier is not symmetric, or has planets of different numbers; planets that are not alike are on
+        several carriers, or have nonlinear bearings.
     """
     carriers: dict[str, SymmetricCarrier] = {}
     for planets in sets:
@@ -320,18 +329,16 @@ def rotating_frame(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> RotatingF
 
 
 def _check_varying(frame: RotatingFrame) -> None:
-    """Refuse stiffness that varies with several carriers, or that is not linear."""
-    of_meshes = [frame.planets_of(m) for m in range(len(frame.assembly.elements)) if frame.varies_at(m)]
-    varying = sorted({planets.carrier for planets in of_meshes if planets is not None})
-    if len(varying) > 1:
+    """Refuse planets that are not alike on several carriers, or whose bearings are not linear."""
+    unlike = sorted({planets.carrier for planets in frame.sets if planets.is_single})
+    if len(unlike) > 1:
         raise SteadyError(
-            f"bodies.{', bodies.'.join(varying)}: stiffness varies with the angles of several carriers (planets that "
-            "are fewer than three or unequally spaced, or a flexible ring gear), which the steady-state response "
-            "cannot treat; use exugear run"
+            f"bodies.{', bodies.'.join(unlike)}: planets that are fewer than three or unequally spaced on several "
+            "carriers, which the steady-state response cannot treat; use exugear run"
         )
     rows = np.diff(frame.assembly.connectors.rolling.first)
-    for n in frame.varying_bearings:
-        if rows[n]:
+    for carrier in frame.varying_carriers:
+        for n in frame.varying_bearings(carrier)[rows[frame.varying_bearings(carrier)] > 0]:
             raise SteadyError(
                 f"bearings.{frame.assembly.supports[n].family}.model = 'iso16281': on planets that are fewer than "
                 "three or unequally spaced, which the steady-state response cannot treat; set model = 'linear', or "
@@ -389,22 +396,18 @@ def _check(assembly: Assembly) -> None:
 
 
 def _check_ring(assembly: Assembly, elastic: Collection[str]) -> None:
-    """Refuse flexible ring gears whose meshes cannot be written as waves around one carrier."""
+    """Refuse flexible ring gears whose meshes cannot be written as waves around carriers."""
     gearbox = assembly.gearbox
     travelling = [mesh for mesh in gearbox.meshes if mesh.gear in elastic and _has_sectors(gearbox, mesh)]
     if not travelling:
         return
-    family = gearbox.body(travelling[0].gear).family
-    reason = ""
-    if not all(gearbox.body(mesh.gear).fixed for mesh in travelling):
-        reason = "rotates"
-    elif len({mesh.family for mesh in travelling}) > 1:
-        reason = "is one of several"
-    if reason:
-        raise SteadyError(
-            f"bodies.{family}: the flexible ring gear {reason}, which the steady-state response cannot treat yet; set "
-            f"flexibility = 'none' for bodies.{family}, or use exugear run"
-        )
+    for mesh in travelling:
+        body = gearbox.body(mesh.gear)
+        if not body.fixed:
+            raise SteadyError(
+                f"bodies.{body.family}: the flexible ring gear rotates, which the steady-state response cannot treat "
+                f"yet; set flexibility = 'none' for bodies.{body.family}, or use exugear run"
+            )
 
 
 def _has_sectors(gearbox: Gearbox, mesh: Mesh) -> bool:
@@ -442,13 +445,12 @@ def _stiffness_at_rest(frame: RotatingFrame, psi: float, u: Floats) -> Floats:
     return np.asarray(t.T @ tangent_stiffness(frame.assembly, q, frame.mean_meshes) @ t)
 
 
-def _mean_stiffness(frame: RotatingFrame, places: Floats, speed: float, u: Floats) -> Floats:
-    """Mean stiffness (size, size) over angles of the input, rad; what the rotation adds is that of the first."""
-    first = _stiffness(frame, float(places[0]), speed, u)
-    if len(places) == 1:
-        return first
-    at_rest = [_stiffness_at_rest(frame, float(psi), u) for psi in places]
-    return np.asarray(first + np.mean(at_rest, axis=0) - at_rest[0])
+def _mean_stiffness(frame: RotatingFrame, speed: float, u: Floats) -> Floats:
+    """Mean stiffness (size, size) over the angles of carriers; what the rotation adds is that at zero angle."""
+    here = _stiffness(frame, 0.0, speed, u)
+    if not frame.varying_carriers:
+        return here
+    return here + frame.mean(lambda own, psi: _stiffness_at_rest(own, psi, u)) - _stiffness_at_rest(frame, 0.0, u)
 
 
 def place_step(assembly: Assembly) -> float:
@@ -479,6 +481,11 @@ def _residuals(frame: RotatingFrame, psi: float, speed: float, u: Floats, du: Fl
     return np.asarray((needed - assembly.forces(q, v, frame.mean_meshes)) @ t)
 
 
+def _residual(frame: RotatingFrame, psi: float, speed: float, u: Floats) -> Floats:
+    """Generalized forces (size,) at one set of coordinates, as `_residuals` has them."""
+    return np.asarray(_residuals(frame, psi, speed, u[None], None)[0])
+
+
 def _slopes(function: Callable[[Floats], Floats], size: int, step: float) -> Floats:
     """Take derivatives (size, size) by central differences of a function of several steps (n, size) at once."""
     steps = step * np.eye(size)
@@ -487,7 +494,6 @@ def _slopes(function: Callable[[Floats], Floats], size: int, step: float) -> Flo
 
 def _static(
     frame: RotatingFrame,
-    places: Floats,
     speed: float,
     drive: Floats,
     load: Floats,
@@ -497,7 +503,7 @@ def _static(
 ) -> tuple[Floats, float]:
     """Find the static state at a speed, and the torque that keeps it; `matrix` is the stiffness at another speed.
 
-    The mean of the forces over angles of the input (`places`, rad) is in balance.
+    Where stiffness varies with carriers, the mean of the forces over their angles is in balance.
     """
     n = len(u)
     assembly = frame.assembly
@@ -509,7 +515,7 @@ def _static(
     best = before = np.inf
     bordered = np.zeros((n + 1, n + 1))
     for _ in range(MOST_STEPS):
-        held = np.mean([_residuals(frame, float(psi), speed, u[None], None)[0] for psi in places], axis=0)
+        held = frame.mean(partial(_residual, speed=speed, u=u))
         missing = held - load - torque * drive
         error = float(np.abs(np.append(missing, largest * u[pinned])).max()) / largest
         if not error < np.inf or (best < BALANCED and error > 0.5 * best):
@@ -517,7 +523,7 @@ def _static(
         best = min(best, error)
         # The elements are all but linear: one matrix serves for several steps.
         if matrix is None or error > 0.1 * before:
-            matrix = _mean_stiffness(frame, places, speed, u)
+            matrix = _mean_stiffness(frame, speed, u)
         before = error
         bordered[:n, :n], bordered[:n, n], bordered[n, pinned] = matrix, -drive * largest, largest
         step = np.linalg.solve(bordered, -np.append(missing, largest * u[pinned]))
@@ -530,26 +536,30 @@ def _static(
 
 def _changes_over_places(
     frame: RotatingFrame,
+    places: Floats,
     speeds: Floats,
     static: Floats,
     here: tuple[Floats, Floats, Floats],
     report: Callable[[int], None],
 ) -> tuple[tuple[Floats, Floats, Floats], float]:
-    """M and C (places, size, size) and K (3, places, size, size) at the carrier's places less those at the angle zero.
+    """M and C (places, size, size) and K (3, places, size, size) at angles of the input (rad) less those at the first.
 
-    These are given, and so are the static states (3, size) at the speeds. M and C are the same at all speeds. K is
-    linear in the speed where dampers travel around what varies, and else the same. The last result is the largest
-    change of K over the places, over K, without what is known to vary: see `RotatingFrame.without_varying`. `report` is
-    called with the number of each place.
+    These are given of the whole gearbox (`here`), and so are the static states (3, size) at the speeds. M and C are the
+    same at all speeds. K is linear in the speed where dampers travel around what varies, and else the same. The last
+    result is the largest change of K over the places, over K, without what is known to vary: see
+    `RotatingFrame.without_varying`. `report` is called with the number of each place.
 
     Raises
     ------
     SteadyError
         The stiffness changes as the carrier turns.
     """
-    places = frame.places
     speed, u = float(speeds[1]), static[1]
     mass, damping, stiffness = here
+    if frame.without:
+        damping = _damping(frame, 0.0, speed, u)
+        ends = [_stiffness(frame, 0.0, float(speeds[n]), static[n]) for n in (0, 2)]
+        stiffness = np.array([ends[0], stiffness[1], ends[1]])
     masses, dampings = np.zeros((2, len(places), *mass.shape))
     stiffnesses = np.zeros((3, len(places), *mass.shape))
     largest = 0.0

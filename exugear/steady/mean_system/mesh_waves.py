@@ -149,20 +149,19 @@ class MeshWaves:
                     tuple(sorted(bases)),
                     planets.waves,
                     next(iter(steps)) if len(steps) == 1 else None,
-                    planets.passing if name == self.varying_carrier else 0,
+                    planets.passing if name in self.varying_carriers else 0,
                 ),
             )
             for name, (planets, bases, steps) in found.items()
         )
 
-    @cached_property
-    def varying_carrier(self) -> str:
-        """Carrier of planets whose meshes have more waves than there are planets; empty without any.
+    @property
+    def varying_carriers(self) -> tuple[str, ...]:
+        """Carriers of planets whose meshes have more waves than there are planets.
 
         They pass a flexible ring gear, or are not alike.
         """
-        of_waves = ((wave, self.planets(wave)) for wave in self.waves)
-        return next((planets.carrier for wave, planets in of_waves if planets and wave.wave >= planets.waves), "")
+        return self.system.frame.varying_carriers
 
     def planets(self, wave: MeshWave) -> PlanetSet | None:
         """Planets of the meshes of a wave, None of a single mesh."""
@@ -261,7 +260,7 @@ class MeshWaves:
         Stiffness (N m/rad), damping (N m s/rad) and constant moment (N m), as in `MeshArrays.tilt`.
         """
         meshes = self.assembly.meshes
-        varying = np.array([self.system.frame.varies_at(m) for m in range(len(meshes.tilt))], dtype=bool)
+        varying = np.array([bool(self.system.frame.varying_carrier_of(m)) for m in range(len(meshes.tilt))], dtype=bool)
         found = meshes.tilt[:, [TILT_STIFFNESS, TILT_DAMPING, TILT_MOMENT]] * varying[:, None]
         found[:, 1] *= self.system.damper_factor
         return np.asarray(found)
@@ -347,9 +346,13 @@ class MeshWaves:
         Waves are the same at all angles where nothing varies with the carrier. Elsewhere they are a Fourier series
         around it, from values at places around it.
         """
-        frame = self.system.frame
-        places = frame.places if frame.varies else np.zeros(1)
-        return np.asarray(np.mean([self._projected(at(float(psi)), float(psi)) for psi in places], axis=0))
+        found = self._projected(at(0.0), 0.0)
+        for carrier in self.varying_carriers:
+            places = self.system.frame.places_of(carrier).tolist()
+            mean = np.mean([self._projected(at(psi), psi) for psi in places], axis=0)
+            own = [getattr(self.planets(wave), "carrier", "") == carrier for wave in self.waves]
+            found[own] = mean[own]
+        return found
 
     def _projected(self, values: Floats, psi: float) -> Floats:
         """Waves (m, ...) of values (meshes, ...) at an angle of the input, rad."""
@@ -378,7 +381,7 @@ def mesh_waves(system: MeanSystem, passing: int = 0) -> MeshWaves:
     names: list[list[str]] = []
     waves: list[MeshWave] = []
     groups = mesh_groups(frame)
-    varying = [planets for meshes, planets in groups if frame.varies_at(meshes[0])]
+    varying = [planets for meshes, planets in groups if frame.varying_carrier_of(meshes[0])]
     displaced = displaced_carriers(assembly, frame.sets)
     for meshes, planets in groups:
         mesh = assembly.elements[meshes[0]].mesh
@@ -403,7 +406,7 @@ def mesh_waves(system: MeanSystem, passing: int = 0) -> MeshWaves:
             label = f"{name} {wave_name(number, planets.waves)}" if number else name
             waves.append(MeshWave(label, mesh.family, *own, number, float(weight), base, sense, planets.ratio, ahead))
     found = MeshWaves(system, tuple(waves), np.array(orders), tuple(", ".join(name) for name in names), passing)
-    return replace(found, neighbours=NEIGHBOURS) if found.varying_carrier else found
+    return replace(found, neighbours=NEIGHBOURS) if found.varying_carriers else found
 
 
 def mesh_groups(frame: RotatingFrame) -> tuple[tuple[tuple[int, ...], PlanetSet | None], ...]:

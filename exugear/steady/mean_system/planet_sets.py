@@ -61,10 +61,6 @@ class PlanetSet:
         """
         return self.waves // 2 if self.waves % 2 == 0 else self.waves
 
-    def in_steps(self, passages: int) -> int:
-        """Count the steps of `passing` that a number of planet passages has."""
-        return passages * self.waves // self.passing
-
     def kinds(self, count: int | None = None) -> tuple[tuple[WaveKind, int], ...]:
         """Kind and wave number of each wave, by default of as many as planets, which describe any motion of these.
 

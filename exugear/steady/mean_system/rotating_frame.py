@@ -13,6 +13,7 @@ and its modal coordinates those of their wave numbers. Bodies on fixed axes keep
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -44,8 +45,8 @@ class RotatingFrame:
     sets: tuple[PlanetSet, ...]
     carriers: tuple[SymmetricCarrier, ...] = ()
     """Flexible carriers, which the assembly has in this symmetric form."""
-    with_varying: bool = True
-    """Whether meshes and bearings have forces whose stiffness varies as the carrier turns."""
+    without: tuple[str, ...] = ()
+    """Carriers with whose angle no stiffness varies, since the meshes and bearings that do so have no forces."""
 
     @cached_property
     def mean_meshes(self) -> MeshArrays:
@@ -60,9 +61,9 @@ class RotatingFrame:
             meshes = self.assembly.linear_meshes()
             # What tables resist misalignment with is in the forces that they have beyond this.
             meshes = meshes._replace(tilt=np.zeros_like(meshes.tilt))
-        if self.with_varying:
+        if not self.without:
             return meshes
-        kept = np.array([not self.varies_at(m) for m in range(len(meshes.damping))])
+        kept = np.array([self.varying_carrier_of(m) not in self.without for m in range(len(meshes.damping))])
         return meshes._replace(
             stiffness=meshes.stiffness * kept[:, None, None],
             damping=meshes.damping * kept,
@@ -88,25 +89,25 @@ class RotatingFrame:
             found += [(carrier.planets, first + ring) for ring in carrier.rings]
         return tuple(found)
 
-    @property
-    def varies(self) -> bool:
-        """Whether stiffness varies as the carrier turns: planets pass a flexible ring gear, or are not alike."""
-        return bool(self.assembly.travelling.first.size) or any(planets.is_single for planets in self.sets)
-
     def planets_of(self, mesh: int) -> PlanetSet | None:
         """Planets of which one has a mesh, by its number; None of a mesh without planets."""
         own = self.assembly.elements[mesh].mesh
         return next((planets for planets in self.sets if {own.pinion, own.gear} & set(planets.names)), None)
 
-    def varies_at(self, mesh: int) -> bool:
-        """Whether the stiffness that a mesh gives the gearbox varies as the carrier turns."""
+    def varying_carrier_of(self, mesh: int) -> str:
+        """Carrier with whose angle the stiffness that a mesh gives the gearbox varies; empty of none."""
         planets = self.planets_of(mesh)
-        return planets is not None and self.waves_around(mesh, planets) > 0
+        return planets.carrier if planets is not None and self.waves_around(mesh, planets) else ""
 
     @cached_property
-    def varying_bearings(self) -> Integers:
-        """Numbers of the bearings of planets that are not alike."""
-        single = {name for planets in self.sets if planets.is_single for name in planets.names}
+    def varying_carriers(self) -> tuple[str, ...]:
+        """Carriers with whose angles the stiffness varies, in the order of their meshes."""
+        of_meshes = map(self.varying_carrier_of, range(len(self.assembly.elements)))
+        return tuple(name for name in dict.fromkeys(of_meshes) if name and name not in self.without)
+
+    def varying_bearings(self, carrier: str) -> Integers:
+        """Numbers of the bearings of a carrier's planets where these are not alike."""
+        single = {name for own in self.sets if own.is_single and own.carrier == carrier for name in own.names}
         return np.flatnonzero([support.body in single for support in self.assembly.supports])
 
     def ring_waves(self, mesh: int) -> int:
@@ -129,31 +130,56 @@ class RotatingFrame:
         alternating = planets.waves % 2 == 0
         return max(planets.waves, 2 * highest + 1 + alternating) if highest else 0
 
-    @cached_property
+    @property
     def places(self) -> Floats:
-        """Angles of the input (p,), rad, at which carriers are evenly spread from one planet's place to the next.
-
-        Over them and all planets products of two waves around a flexible ring gear have their exact mean. With an even
-        number of planets they reach to the place after that: see `PlanetSet.passing`. Those of single planets are
-        spread over a revolution.
-        """
-        for m in range(len(self.assembly.elements)):
-            planets = self.planets_of(m)
-            if planets is not None and self.varies_at(m):
-                least = SINGLE_PLACES if planets.is_single else PLACES * planets.waves // planets.passing
-                count = max(least, 2 * self.ring_waves(m) // planets.passing + 1)
-                passage = 2.0 * math.pi / abs(planets.passing * planets.ratio)
-                return np.asarray(passage * np.arange(count) / count)
+        """Angles of the input (p,), rad, at which the slowest planets are evenly spread from one place to the next."""
         passage = max(2.0 * math.pi / abs(planets.waves * planets.ratio) for planets in self.sets)
         return np.asarray(passage * np.arange(PLACES) / PLACES)
 
+    def places_of(self, carrier: str) -> Floats:
+        """Angles of the input (p,), rad, at which a carrier that stiffness varies with is evenly spread over a passage.
+
+        Over them and all planets products of two waves around a flexible ring gear have their exact mean. With an even
+        number of planets they reach to the place after the next: see `PlanetSet.passing`. Those of single planets are
+        spread over a revolution.
+        """
+        meshes = [m for m in range(len(self.assembly.elements)) if self.varying_carrier_of(m) == carrier]
+        planets = next(own for own in self.sets if own.carrier == carrier)
+        least = SINGLE_PLACES if planets.is_single else PLACES * planets.waves // planets.passing
+        count = max(least, 2 * max(map(self.ring_waves, meshes)) // planets.passing + 1)
+        passage = 2.0 * math.pi / abs(planets.passing * planets.ratio)
+        return np.asarray(passage * np.arange(count) / count)
+
     @cached_property
     def without_varying(self) -> RotatingFrame:
-        """The same gearbox without what varies as the carrier turns; itself if nothing does."""
-        if not self.varies:
+        """The same gearbox without what varies as carriers turn; itself if nothing does."""
+        return self._without(self.varying_carriers)
+
+    @cached_property
+    def by_carrier(self) -> tuple[tuple[str, RotatingFrame], ...]:
+        """Carriers with which stiffness varies, each with the gearbox without what varies with others."""
+        carriers = self.varying_carriers
+        return tuple((name, self._without([other for other in carriers if other != name])) for name in carriers)
+
+    def _without(self, carriers: Sequence[str]) -> RotatingFrame:
+        if not carriers:
             return self
-        connectors = self.assembly.connectors.without_forces(self.varying_bearings)
-        return replace(self, assembly=replace(self.assembly, connectors=connectors), with_varying=False)
+        bearings = np.concatenate([self.varying_bearings(name) for name in carriers])
+        connectors = self.assembly.connectors.without_forces(bearings)
+        return replace(self, assembly=replace(self.assembly, connectors=connectors), without=(*self.without, *carriers))
+
+    def mean(self, function: Callable[[RotatingFrame, float], Floats]) -> Floats:
+        """Mean over the angles of the carriers with which stiffness varies of something at an angle of the input, rad.
+
+        What several of them vary is the sum of what each of them does; without any it is the value at zero angle.
+        """
+        means = [
+            np.mean([function(frame, float(psi)) for psi in self.places_of(name)], axis=0)
+            for name, frame in self.by_carrier
+        ]
+        if len(means) == 1:
+            return np.asarray(means[0])
+        return np.asarray(np.sum(means, axis=0) - (len(means) - 1) * function(self.without_varying, 0.0))
 
     def _unit(self) -> Jet:
         size = self.assembly.size

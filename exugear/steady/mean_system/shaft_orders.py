@@ -25,7 +25,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -218,15 +218,19 @@ def any_shaft_orders(assembly: Assembly) -> bool:
     return bool(assembly.meshes.error_pieces.any() or assembly.gearbox.varying_loads or assembly.gearbox.pin_offsets)
 
 
-def shaft_orders(assembly: Assembly, waves: MeshWaves, moved: Callable[[float], Floats] | None = None) -> ShaftOrders:
+PassingMotion: TypeAlias = Mapping[str, Callable[[float], Floats]]
+"""Motion (size,) about the static state, in the rotating frame, that passing planets of each carrier cause at an angle
+of the input, rad; the mean of all is in that of the first."""
+
+
+def shaft_orders(assembly: Assembly, waves: MeshWaves, moved: PassingMotion | None = None) -> ShaftOrders:
     """Find the deviations of an assembly's gears and the stated loads, and the orders that matter.
 
     Parameters
     ----------
     assembly : with deviations
     waves : mesh components of its averaged system without deviations
-    moved : motion (size,) about the static state, in the rotating frame, that passing planets cause at an angle of the
-        input, rad; by default none. Gears and loads are turned by its mean.
+    moved : motion that passing planets cause; by default none. Gears and loads are turned by its mean.
     """
     series = _Series(assembly, waves, moved)
     for meshes, planets in waves.groups:
@@ -249,14 +253,14 @@ DEVIATION = -1
 class _Series:
     """Collects the terms of all families of meshes."""
 
-    def __init__(self, assembly: Assembly, waves: MeshWaves, moved: Callable[[float], Floats] | None) -> None:
+    def __init__(self, assembly: Assembly, waves: MeshWaves, moved: PassingMotion | None) -> None:
         self.assembly = assembly
-        self.moved = moved
+        self.moved = moved or {}
         self.waves = waves
         self.frame = waves.system.frame
         speed = float(waves.system.speeds[1])
         self.speed = speed
-        self.still = self._state(0.0, moves=False) + self._turned_by_passing
+        self.still = self._state(0.0) + self._turned_by_passing
         self.cycles = [f"cycle of {name}" for name in waves.base_names]
         """Names of the bases of the meshes."""
         self.load = waves.mean_stiffness * (waves.values(assembly.meshes.deflection, speed) - waves.rest)
@@ -384,12 +388,12 @@ class _Series:
     @cached_property
     def _turned_by_passing(self) -> Floats:
         """Mean change of all coordinates by passing planets, behind them those of a flexible ring gear at planets."""
-        if self.moved is None:
-            return np.zeros_like(self._state(0.0))
-        turn = min(2.0 * math.pi / abs(planets.ratio) for planets in self.frame.sets)
-        angles = turn * np.arange(PASSING_SAMPLES) / PASSING_SAMPLES
-        changes = [self._state(float(psi)) - self._state(float(psi), moves=False) for psi in angles]
-        return np.asarray(np.mean(changes, axis=0))
+        found = np.zeros_like(self._state(0.0))
+        for carrier in self.moved:
+            ratio = next(planets.ratio for planets in self.frame.sets if planets.carrier == carrier)
+            angles = (2.0 * math.pi / abs(ratio) * np.arange(PASSING_SAMPLES) / PASSING_SAMPLES).tolist()
+            found += np.mean([self._state(psi, carrier) - self._state(psi) for psi in angles], axis=0)
+        return found
 
     @cached_property
     def _reaches(self) -> list[int]:
@@ -477,23 +481,23 @@ class _Series:
         values = values * np.exp(1j * np.arange(len(values)) * angle)
         return [(n, complex(x)) for n, x in enumerate(values) if abs(x) > LEAST * np.abs(values).max()]
 
-    def _state(self, psi: float, moves: bool = True) -> Floats:
+    def _state(self, psi: float, carrier: str = "") -> Floats:
         """Return coordinates at an angle of the input (rad), behind them those of a flexible ring gear at planets.
 
-        They are static, and with `moves` as passing planets change them.
+        They are static, or as the passing planets of a carrier change them.
         """
         static = self.waves.system.static_at(self.speed)
-        if moves and self.moved is not None:
-            static = static + self.moved(psi)
+        if carrier in self.moved:
+            static = static + self.moved[carrier](psi)
         q = self.frame.state(psi, self.speed, static)[0]
         return self.assembly.with_travelling(q, np.zeros_like(q))[0]
 
-    def _row(self, angles: list[tuple[int, float]], psi: float) -> Floats:
+    def _row(self, angles: list[tuple[int, float]], psi: float, carrier: str = "") -> Floats:
         """Row (size,) of a gear's angle, the sum of coordinates with signs, by those of the frame at an angle (rad)."""
         size = self.assembly.size
         turning = np.zeros(size)
         if any(at >= size for at, _ in angles):
-            x = self._state(psi)
+            x = self._state(psi, carrier)
             still = np.zeros_like(x)
             seats = travelling_tangent(x, still, still, self.assembly.travelling).place
             turning = np.sum([sign * seats[at] for at, sign in angles], axis=0)
@@ -516,7 +520,7 @@ class _Series:
         if planets is None:
             return [(0, np.ones(1), self._row(angles, 0.0).astype(complex))]
         turned, shapes = self._shapes_over_turn(planets, waves)
-        rows = [self._row(angles, angle / planets.ratio) for angle in turned.tolist()]
+        rows = [self._row(angles, angle / planets.ratio, planets.carrier) for angle in turned.tolist()]
         of_shapes = np.fft.fft(shapes[:, place], axis=0) / len(turned)
         of_rows = np.fft.fft(rows, axis=0) / len(turned)
         most = self._most_turns(planets, waves)

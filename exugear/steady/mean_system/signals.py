@@ -16,6 +16,7 @@ import numpy as np
 from exugear.steady.mean_system.mean_system import RATE_STEP, MeanSystem, place_step
 from exugear.steady.mean_system.mesh_waves import MeshWaves, wave_name
 from exugear.steady.mean_system.planet_sets import PlanetSet
+from exugear.steady.mean_system.rotating_frame import RotatingFrame
 from exugear.steady.mean_system.standing_loads import (
     GEAR_FORCE,
     GEAR_MOMENT,
@@ -120,8 +121,11 @@ def signal_rows(system: MeanSystem, speed: float) -> SignalRows:
     if assembly.supports:
         turn, labels = support_waves(assembly, frame.sets)
         # Bearings of planets that are not alike count by their mean here; `varying_bearings` has the rest.
-        places = frame.places if frame.varying_bearings.size else np.zeros(1)
-        by_place, by_rate = np.mean([_load_rows(system, speed, float(psi)) for psi in places], axis=0)
+        unlike = any(frame.varying_bearings(name).size for name in frame.varying_carriers)
+        if unlike:
+            by_place, by_rate = frame.mean(lambda own, psi: _load_rows(system, own, speed, psi))
+        else:
+            by_place, by_rate = _load_rows(system, frame, speed, 0.0)
         count = 3 * len(assembly.supports)
         seats = turn @ _seat_rows(assembly)
         forces = [SignalName(f"support_force {label}", "support_force", "N") for label in labels]
@@ -149,9 +153,8 @@ def _part(signal: SignalName, name: str) -> SignalName:
     return SignalName(f"{signal.name} {name}", signal.quantity, signal.units)
 
 
-def _load_rows(system: MeanSystem, speed: float, psi: float) -> tuple[Floats, Floats]:
-    """Return `_loads`, forces in multi-blade components, by the frame's coordinates and rates, (6 supports, size)."""
-    frame = system.frame
+def _load_rows(system: MeanSystem, frame: RotatingFrame, speed: float, psi: float) -> Floats:
+    """Return `_loads`, forces in multi-blade components, by coordinates and rates of the frame, (2, 6 s, size)."""
     assembly = frame.assembly
     t, t1, _ = frame.matrices(psi)
     q, v, _ = frame.state(psi, speed, system.static_at(speed))
@@ -160,7 +163,7 @@ def _load_rows(system: MeanSystem, speed: float, psi: float) -> tuple[Floats, Fl
     turn = support_waves(assembly, frame.sets, psi)[0]
     for values in (by_q, by_v):
         values[: len(turn)] = turn @ values[: len(turn)]
-    return by_q @ t + speed * by_v @ t1, by_v @ t
+    return np.array([by_q @ t + speed * by_v @ t1, by_v @ t])
 
 
 def _loads(assembly: Assembly, q: Floats, v: Floats) -> Floats:

@@ -47,7 +47,7 @@ def standing_gears(frame: RotatingFrame) -> tuple[str, ...]:
         gear: None
         for mesh, element in enumerate(assembly.elements)
         for body, gear in _ends(element)
-        if assembly.gearbox.body(body).fixed and not frame.varies_at(mesh)
+        if assembly.gearbox.body(body).fixed and not frame.varying_carrier_of(mesh)
     }
     return tuple(found)
 
@@ -92,7 +92,7 @@ def gear_load_rows(waves: MeshWaves) -> tuple[Floats, Floats, Floats]:
     for number, wave in enumerate(waves.waves):
         meshes, planets = groups[wave.first]
         shapes = np.ones((1, 1)) if planets is None else planets.shapes(0.0)[0]
-        if waves.system.frame.varies_at(wave.first):
+        if waves.system.frame.varying_carrier_of(wave.first):
             continue
         for mesh, share in zip(meshes, shapes[:, wave.wave], strict=True):
             element = assembly.elements[mesh]

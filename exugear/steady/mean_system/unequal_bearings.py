@@ -122,15 +122,15 @@ class UnequalBearings:
         return np.asarray(found)
 
 
-def varying_bearings(system: MeanSystem) -> UnequalBearings | None:
-    """Find what the bearings of planets that are not alike have beyond their mean over the carrier's angle, if any."""
+def varying_bearings(system: MeanSystem, carrier: str) -> UnequalBearings | None:
+    """Find what the bearings of planets that are not alike have beyond their mean over a carrier's angle, if any."""
     frame = system.frame
-    numbers = frame.varying_bearings
+    numbers = frame.varying_bearings(carrier)
     if not numbers.size:
         return None
     given = frame.assembly.connectors.chosen(numbers)
     none = given.without_forces(np.arange(len(numbers)))
-    planets = next(planets for planets in frame.sets if planets.is_single)
+    planets = next(planets for planets in frame.sets if planets.carrier == carrier)
     found = _series(system, (given, none), planets, numbers, VARYING_SAMPLES)
     turning = found.turns != 0
     # Directions that do not vary, such as along the axis, are none of its coordinates.

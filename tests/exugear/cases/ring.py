@@ -117,14 +117,22 @@ def drum_content(grc: Gearbox, folder: Path) -> dict[str, Any]:
     return content
 
 
-def two_stage_content(grc: Gearbox, folder: Path) -> dict[str, Any]:
-    """Content of a gearbox file with that stage, whose sun drives the carrier of a second one with a rigid ring."""
+def two_stage_content(grc: Gearbox, folder: Path, rim: str = "") -> dict[str, Any]:
+    """Content of a gearbox file with that stage, whose sun drives the carrier of a second one.
+
+    The ring gear of the second one is rigid, or flexible with a mesh of its own.
+    """
     content = ring_content(grc, folder)
     bodies = content["bodies"]
     for name in ("carrier", "planet", "lss"):
         bodies[f"{name}_2"] = copy.deepcopy(bodies[name])
     bodies["planet_2"]["carrier"] = "carrier_2"
     bodies["housing_2"] = {name: bodies["housing"][name] for name in ("fixed", "axis_position_mm", "gears_z_mm")}
+    if rim:
+        solid = bodies["housing"]["solid"]
+        seats = {name if name == "ring" else f"{name}_2": seat for name, seat in solid["seats"].items()}
+        bodies["housing_2"] |= {"flexibility": "elastic", "solid": solid | {"file": rim, "seats": seats}}
+        content["mounts"] |= {f"{name}_2": own | {"body": "housing_2"} for name, own in content["mounts"].items()}
     for name, bearing in list(content["bearings"].items()):
         ends = {end: f"{bearing[end]}_2" for end in ("body", "on") if end in bearing}
         content["bearings"][f"{name}_2"] = copy.deepcopy(bearing) | ends

@@ -237,7 +237,7 @@ def test_frequencies_at_an_angle_of_the_carrier_are_those_of_a_stage_built_at_it
     system = built(0.0)
     held = np.array([frequencies(one) for one in system.at_angles()])
     np.testing.assert_allclose(held[0], frequencies(system.frozen), rtol=1e-9)
-    here = frequencies(built(float(system.frame.places[place])).frozen)
+    here = frequencies(built(float(system.frame.places_of("carrier")[place])).frozen)
     np.testing.assert_allclose(held[place], here, rtol=1e-3)
     over_zero = held / held[0]
     assert np.abs(over_zero[place] - 1.0).max() > 5e-3

@@ -152,7 +152,7 @@ def test_a_computation_can_be_stopped_while_the_orders_beside_others_are_chosen(
 
     with pytest.raises(KeyboardInterrupt):
         response_of(assembly, SteadySettings(SpeedRange(*RANGE, 2), harmonics=2, combinations=1), prepared=stop)
-    total = 3 + len(mean_system(assembly, np.array(RANGE)).frame.places) - 1
+    total = 3 + len(mean_system(assembly, np.array(RANGE)).frame.places_of("carrier")) - 1
     assert seen[:-1] == [("linearisation", done, total) for done in range(1, total + 1)]
     assert seen[-1][0].startswith("choice of ")
     assert seen[-1][1] <= seen[-1][2]
