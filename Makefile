@@ -205,5 +205,5 @@ lock:
 
 clean:
 	rm -rf $(VENV) $(VENV)-lock $(WEB_VENV) web/node_modules results build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache
-	rm -rf docs/elsewhere docs/gallery docs/reference/rooms docs/reference/command_line.md examples/results
+	rm -rf docs/elsewhere docs/gallery docs/reference/api docs/reference/command_line.md examples/results
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -38,8 +38,7 @@ extensions = [
     "interface_pages",
     "key_pages",
     "outside_pages",
-    "python_names",
-    "room_pages",
+    "api_pages",
 ]
 templates_path = ["_templates"]
 exclude_patterns = ["tools", "_static"]

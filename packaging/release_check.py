@@ -382,7 +382,7 @@ def _in_sdist(name: str) -> bool:
 
 
 def _documents(root: Path) -> list[Path]:
-    made = {"elsewhere", "gallery", "rooms"}
+    made = {"elsewhere", "gallery", "api"}
     pages = [page for page in (root / "docs").rglob("*.md") if not set(page.parts) & made]
     return sorted([*pages, *root.glob("*.md"), *(root / "paper").glob("*.md")])
 

@@ -13,7 +13,7 @@ from spellchecker import SpellChecker
 
 ROOT = Path(__file__).parent.parent.parent
 WORDS = ROOT / "docs" / "words.txt"
-GENERATED = ("elsewhere", "gallery", "keys", "rooms")
+GENERATED = ("elsewhere", "gallery", "keys", "api")
 NOT_PROSE = re.compile(
     r"^(`{3,}|~{3,}).*?^\1"  # fenced blocks
     r"|^(?: {4}|\t).*?$"  # indented blocks

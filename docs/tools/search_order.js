@@ -7,7 +7,7 @@ const CHAPTERS = [
   ["reference/keys/", 3],
   ["reference/glossary", 2],
   ["reference/python", -12],
-  ["reference/rooms/", -14],
+  ["reference/api/", -14],
   ["reference/modules", -14],
   ["elsewhere/", -8],
   ["development/", -8],

@@ -254,7 +254,9 @@ def mean_system(assembly: Assembly, speeds: Floats, prepared: Steps | None = Non
     rows = []
     # Where stiffness varies with the carrier the static state balances the mean over its places.
     matrix = None
-    turned = [(own, frame.places_of(name)) for name, own in frame.by_carrier] or [(frame, frame.places)] * bool(sets)
+    turned = [(own, frame.places_of(name)) for name, own in frame.by_carrier]
+    if sets and not turned:
+        turned = [(frame, frame.places)]
     total = len(at) + sum(len(places) - 1 for _, places in turned)
     report = partial(prepared or (lambda words, done, total: None), "linearisation")
     for speed in at:
