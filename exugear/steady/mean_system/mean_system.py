@@ -339,8 +339,8 @@ def _check_varying(frame: RotatingFrame) -> None:
             "carriers, which the steady-state response cannot treat; use exugear run"
         )
     rows = np.diff(frame.assembly.connectors.rolling.first)
-    for carrier in frame.varying_carriers:
-        for n in frame.varying_bearings(carrier)[rows[frame.varying_bearings(carrier)] > 0]:
+    for n in (n for carrier in unlike for n in frame.varying_bearings(carrier)):
+        if rows[n]:
             raise SteadyError(
                 f"bearings.{frame.assembly.supports[n].family}.model = 'iso16281': on planets that are fewer than "
                 "three or unequally spaced, which the steady-state response cannot treat; set model = 'linear', or "
