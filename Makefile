@@ -84,7 +84,7 @@ FIND_PYTHON := for candidate in $(if $(PYTHON),"$(PYTHON)",python3 python3.13 py
 	echo "exugear needs Python 3.11, 3.12 or 3.13; found: $$($(or $(PYTHON),python3) --version 2>&1)." >&2; \
 	echo "Install one, or specify it: make PYTHON=/path/to/python3.12 TARGET" >&2; exit 1
 
-.PHONY: release-check test-browser help install demo demo-short test validate validate-long benchmarks check check-web vendor-web docs dist wheel-test wheel-test-all lock clean
+.PHONY: release-check test-browser test-edit-page test-report-page help install demo demo-short test validate validate-long benchmarks check check-web vendor-web docs dist wheel-test wheel-test-all lock clean
 
 help:
 	@echo "make demo        GRC 750 from gear data to waterfalls, modes and a report, into $(RESULTS)"
@@ -138,8 +138,13 @@ test: $(INSTALLED)
 	$(RUN)/python -m pytest $(SIDE_BY_SIDE) $(if $(PACKAGE),$(OF_PACKAGE))
 
 # Pages in a real browser: skipped, and said, where no chromium is.
-test-browser: $(INSTALLED)
-	$(RUN)/python -m pytest -m "browser and not long" tests/exugear/report
+test-browser: test-edit-page test-report-page
+
+test-edit-page: $(INSTALLED)
+	$(RUN)/python -m pytest -m "browser and not long" tests/exugear/report/test_edit_page.py
+
+test-report-page: $(INSTALLED)
+	$(RUN)/python -m pytest -m "browser and not long" tests/exugear/report --ignore tests/exugear/report/test_edit_page.py
 
 validate: $(INSTALLED)
 	$(RUN)/python -m pytest -m "validation and not long" $(SIDE_BY_SIDE)

@@ -52,6 +52,7 @@ def solver(two_rings):
     return solver_of(two_rings, RANGE, "parametric", 2)
 
 
+@pytest.mark.validation
 def test_damping_takes_the_power_that_the_meshes_of_both_stages_give(solver):
     assert solver.model.waves.varying_carriers == ("carrier", "carrier_2")
     taken, given = dissipated_and_given(solver.model, solver.response(SPEED))

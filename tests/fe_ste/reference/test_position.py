@@ -56,6 +56,7 @@ def test_pressures_push_and_sum_to_the_normal_force(solved):
     assert solved.load_share[0] > 0.99  # single contact at the pitch point
 
 
+@pytest.mark.validation
 def test_geometric_nonlinearity_adds_less_than_a_thousandth(solved):
     small = nonlinear_position(SPUR_PAIR, TORQUE, 0.0, dataclasses.replace(COARSE, finite_deformation=False))
     # CalculiX: +0.07 % (benchmarks/calculix).

@@ -187,7 +187,7 @@ def assert_exudyn_agrees(grc: Gearbox, stiffness: dict, steps: int, limit: float
 
 
 def test_bushing_variant_follows_exudyn(grc: Gearbox, stiffness: dict) -> None:
-    assert_exudyn_agrees(grc, stiffness, 600, 1e-6)
+    assert_exudyn_agrees(grc, stiffness, 200, 1e-6)
 
 
 @pytest.mark.validation
