@@ -3,10 +3,9 @@
 Each excitation is a base with its own frequency. The joint response is a sum of orders (lines), at integer combinations
 k . base of these frequencies. Real signals need one line of each pair k, -k.
 
-Bases in a ratio of small integers (a shaft whose wheel has twice the teeth of its pinion) have lines in common, meshes
-among each other, and carriers whose passing planets couple lines. The
-response of two bases at one frequency is one line: bases are then multiples of fewer independent frequencies, and lines
-are told apart by these.
+Bases in a ratio of small integers (a shaft whose wheel has twice the teeth of its pinion) have lines in common, and so
+have carriers whose passing planets couple lines. The response of two bases at one frequency is one line: bases are then
+multiples of fewer independent frequencies, and lines are told apart by these.
 
 Sample j of M has the angles theta = 2 pi z j / M with an integer z for each base. Line k falls into slot k . z mod M of
 one discrete Fourier transform of M samples, however many bases there are (Kammerer, Potts and Volkmer 2015). With z
@@ -254,7 +253,7 @@ def modulated(lines: LineSet, modulators: Sequence[Modulator], most: int = 0) ->
     bases = np.append(lines.bases, orders)
     rows = {(*line.tolist(), *turns) for line in lines.index for turns in _all_turns(line, modulators, most)}
     couple = sum(modulator.passing > 0 for modulator in modulators)
-    slow = _independent(orders) if couple > 1 else np.eye(len(orders), dtype=np.int64)
+    slow = _independent(orders, MOST_TEETH, MOST_TEETH) if couple > 1 else np.eye(len(orders), dtype=np.int64)
     return _lines_of_rows(np.array(sorted(rows)), bases, scipy.linalg.block_diag(lines.units, slow))
 
 
@@ -424,17 +423,17 @@ def _lines_of_rows(rows: Integers, bases: Floats, units: Integers) -> LineSet:
     return LineSet(index, bases, units)
 
 
-def _independent(bases: Floats, whole: int = LARGEST_RATIO) -> Integers:
+def _independent(bases: Floats, whole: int = LARGEST_RATIO, largest: int = LARGEST_RATIO) -> Integers:
     """Multiples (bases, independent) of independent frequencies that give the bases: greatest common divisors.
 
-    `whole` is the largest multiple of a base that another one may be.
+    `whole` is the largest multiple of a base that another one may be, `largest` the largest integer of other ratios.
     """
     groups: list[list[tuple[int, Fraction]]] = []
     for n, base in enumerate(bases):
         for group in groups:
             ratio = base / bases[group[0][0]]
-            near = Fraction(ratio).limit_denominator(LARGEST_RATIO)
-            most = whole if near.denominator == 1 else LARGEST_RATIO
+            near = Fraction(ratio).limit_denominator(largest)
+            most = whole if near.denominator == 1 else largest
             if near.numerator <= most and abs(ratio - near) < SAME * ratio:
                 group.append((n, near))
                 break

@@ -137,10 +137,10 @@ class RotatingFrame:
         return np.asarray(passage * np.arange(PLACES) / PLACES)
 
     def places_of(self, carrier: str) -> Floats:
-        """Angles of the input (p,), rad, at which a carrier that stiffness varies with is evenly spread over a passage.
+        """Angles of the input (p,), rad, at which a carrier is evenly spread from one planet's place to the next.
 
         Over them and all planets products of two waves around a flexible ring gear have their exact mean. With an even
-        number of planets they reach to the place after the next: see `PlanetSet.passing`. Those of single planets are
+        number of planets they reach to the place after that: see `PlanetSet.passing`. Those of single planets are
         spread over a revolution.
         """
         meshes = [m for m in range(len(self.assembly.elements)) if self.varying_carrier_of(m) == carrier]

@@ -163,6 +163,9 @@ def test_orders_at_which_several_carriers_coincide_are_one():
     assert {0.0, 1.0, 2.0, 3.0, 4.0, 6.0} <= set(orders.round(9).tolist())
     beside = lines.index[lines.index[:, 0] != 0][:, 2:]
     assert not (beside != 0).all(axis=1).any()
+    # 47 passages of one are 11 of the other: no line but the mean stands still.
+    slow = modulated(line_set([40.3, 91.7], 1), [Modulator(11.0, (0,), 4, 0, 4), Modulator(47.0, (1,), 3, 0, 3)], 12)
+    assert np.count_nonzero(slow.orders < 1e-9) == 1
 
 
 @pytest.mark.validation
