@@ -265,6 +265,7 @@ def test_speeds_at_which_loads_do_not_settle_are_told():
     assert not any("mean speed" in own.text for own in response_findings(data))
 
 
+@pytest.mark.validation
 def test_a_torque_moves_rolling_bearings_evaluated_in_time_as_in_a_run():
     """Method `nonlinear`: balls and rollers without clearance; order 7 is beside all orders of the mesh."""
     content = tomllib.loads(BEARING_CASE) | {

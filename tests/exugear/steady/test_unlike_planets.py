@@ -146,6 +146,7 @@ def test_the_power_of_the_meshes_is_what_the_dampers_dissipate():
     assert taken == pytest.approx(given, rel=1e-6)
 
 
+@pytest.mark.validation
 def test_both_ends_of_the_range_of_damping_are_those_of_other_dampers():
     """Half and twice the damping of meshes and bearings, what varies with the carrier included."""
     content = on_unlike_bearings(gear_trains.unevenly_spaced())
