@@ -126,7 +126,8 @@ def _tops(values: Floats) -> Integers:
 
 def varying_carriers(data: xr.Dataset) -> tuple[str, ...]:
     """Carriers with whose angles stiffness varies, as a file of a response names them."""
-    return tuple(str(data.attrs.get("varying_carrier", "")).split(", ")) if data.attrs.get("varying_carrier") else ()
+    names = str(data.attrs.get("varying_carrier", ""))
+    return tuple(names.split(", ")) if names else ()
 
 
 def sidebands(data: xr.Dataset, peak: Peak, least: float = 0.01) -> tuple[Sideband, ...]:

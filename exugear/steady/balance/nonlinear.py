@@ -20,6 +20,7 @@ from exugear.steady.balance.passing_planets import (
     bearing_parts,
     by_carrier,
     carried_readings,
+    solve_one_by_one,
 )
 from exugear.steady.balance.response import Response, rates_of
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError, solve_lines
@@ -460,9 +461,7 @@ class Tangent:
             if passing:
                 rest = np.zeros((len(found), self._passing_bearings), dtype=complex)
                 flat = found.reshape(len(found), -1)
-                own = np.hstack([flat, rest])
-                for carrier in passing:
-                    own = carrier.solve(own)
+                own = solve_one_by_one(passing, np.hstack([flat, rest]))
                 found = own[:, : flat.shape[1]].reshape(found.shape)
             return lengths * found
 

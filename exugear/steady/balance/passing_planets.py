@@ -245,6 +245,13 @@ def passing_planets(
     return tuple(PassingPlanets(model, interface, own, answers[..., at]) for own, at in by_carrier(parts))
 
 
+def solve_one_by_one(passing: Sequence[PassingPlanets], right: Complexes) -> Complexes:
+    """Solve for readings (n, k) with what each carrier couples, one after the other: a preconditioner of several."""
+    for carrier in passing:
+        right = carrier.solve(right)
+    return right
+
+
 def by_carrier(parts: Sequence[VaryingPart]) -> Iterator[tuple[list[VaryingPart], Integers]]:
     """Parts of each carrier, and the places of their forces (f,) among all."""
     for carrier in dict.fromkeys(part.carrier for part in parts):

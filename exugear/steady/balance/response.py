@@ -24,7 +24,13 @@ import numpy as np
 
 from exugear.steady.balance.interface import Interface
 from exugear.steady.balance.model import HarmonicBalanceModel
-from exugear.steady.balance.passing_planets import BearingForces, PassingPlanets, PlanetBearings, passing_planets
+from exugear.steady.balance.passing_planets import (
+    BearingForces,
+    PassingPlanets,
+    PlanetBearings,
+    passing_planets,
+    solve_one_by_one,
+)
 from exugear.steady.harmonics.linear_solvers import solve_lines
 from exugear.steady.harmonics.lines import add_answered, flat
 from exugear.steady.mean_system.bearing_waves import TILTS
@@ -167,8 +173,8 @@ def deviation_forces(
     beyond = model.coupling.of(
         model.cycles.tangents_beyond_mean.at(ports, interface.speed), errors.reshape(len(errors), -1)
     )
-    readings = np.hstack([errors.reshape(len(errors), -1), np.zeros((len(errors), len(model.bearing_lengths)))])
     for own in passing:
+        readings = np.hstack([errors.reshape(len(errors), -1), np.zeros((len(errors), len(model.bearing_lengths)))])
         beyond += own.damper_forces(readings)[:, : beyond.shape[1]]
     return forces - beyond.reshape(forces.shape)
 
@@ -354,13 +360,7 @@ class LineBalance:
         add_answered(cached_bundle(self._coupling.terms), *self._parts, readings, *self._memory, self._octets, out)
         if self._loaded is not None or self.passing:
             out += (self._answers @ self._dampers(readings)[..., None])[..., 0]
-        return self._without_passing(out)
-
-    def _without_passing(self, readings: Complexes) -> Complexes:
-        """Solve what the passing planets of each carrier couple, one carrier after the other: a preconditioner."""
-        for own in self.passing:
-            readings = own.solve(readings)
-        return readings
+        return solve_one_by_one(self.passing, out)
 
     def _dampers(self, readings: Complexes) -> Complexes:
         """Return the forces (n, k) of dampers that are unequal or vary, beyond those of the averaged system."""
@@ -379,7 +379,7 @@ class LineBalance:
     def solve(self, right: Complexes, start: Complexes | None) -> tuple[Complexes, int]:
         """Solve for readings (n, k); the products with K that it took follow."""
         tolerance = PASSING_TOLERANCE if self.passing else TOLERANCE
-        return solve_lines(self._apply, self._without_passing(right), tolerance, start)
+        return solve_lines(self._apply, solve_one_by_one(self.passing, right), tolerance, start)
 
 
 def at_mean_positions(model: HarmonicBalanceModel, interface: Interface, response: Response) -> Interface:

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from itertools import count
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
@@ -252,29 +253,30 @@ def mean_system(assembly: Assembly, speeds: Floats, prepared: Steps | None = Non
     u = np.asarray(np.linalg.solve(frame.matrices(0.0)[0], q - q[pinned] * rolling))
     torque = 0.0
     rows = []
-    # Where stiffness varies with the carrier the static state balances the mean over its places.
     matrix = None
     turned = [(own, frame.places_of(name)) for name, own in frame.by_carrier]
     if sets and not turned:
         turned = [(frame, frame.places)]
     total = len(at) + sum(len(places) - 1 for _, places in turned)
-    report = partial(prepared or (lambda words, done, total: None), "linearisation")
+    done = count(1)
+
+    def report() -> None:
+        if prepared is not None:
+            prepared("linearisation", next(done), total)
+
     for speed in at:
         u, torque = _static(frame, float(speed), drive, load, u, torque, matrix)
         damping, matrix = tangents(frame, 0.0, float(speed), u)
         rows.append((u, torque, damping, matrix))
-        report(len(rows), total)
+        report()
     static, torques, dampings, stiffnesses = (np.array(values) for values in zip(*rows, strict=True))
     mass = _mass(frame, 0.0, static[1])
     variation = 0.0
     over_angles = []
     masses = []
-    done = len(at)
     here = mass, dampings[1], stiffnesses
     for own, places in turned:
-        step = partial(lambda before, place: report(before + place, total), done)
-        changes, largest = _changes_over_places(own, places, at, static, here, step)
-        done += len(places) - 1
+        changes, largest = _changes_over_places(own, places, at, static, here, report)
         variation = max(variation, largest)
         masses.append(changes[0].mean(axis=0))
         dampings = dampings + changes[1].mean(axis=0)
@@ -542,14 +544,14 @@ def _changes_over_places(
     speeds: Floats,
     static: Floats,
     here: tuple[Floats, Floats, Floats],
-    report: Callable[[int], None],
+    report: Callable[[], None],
 ) -> tuple[tuple[Floats, Floats, Floats], float]:
     """M and C (places, size, size) and K (3, places, size, size) at angles of the input (rad) less those at the first.
 
     These are given of the whole gearbox (`here`), and so are the static states (3, size) at the speeds. M and C are the
     same at all speeds. K is linear in the speed where dampers travel around what varies, and else the same. The last
     result is the largest change of K over the places, over K, without what is known to vary: see
-    `RotatingFrame.without_varying`. `report` is called with the number of each place.
+    `RotatingFrame.without_varying`. `report` is called after each place.
 
     Raises
     ------
@@ -588,7 +590,7 @@ def _changes_over_places(
                 "support that rotates with them), which the steady-state response cannot treat; use exugear run instead"
             )
         largest = max(largest, change)
-        report(place)
+        report()
     return (masses, dampings, stiffnesses), largest
 
 

@@ -346,10 +346,11 @@ class MeshWaves:
         Waves are the same at all angles where nothing varies with the carrier. Elsewhere they are a Fourier series
         around it, from values at places around it.
         """
-        found = self._projected(at(0.0), 0.0)
+        here = self._projected(at(0.0), 0.0)
+        found = here.copy()
         for carrier in self.varying_carriers:
-            places = self.system.frame.places_of(carrier).tolist()
-            mean = np.mean([self._projected(at(psi), psi) for psi in places], axis=0)
+            places = self.system.frame.places_of(carrier)[1:].tolist()  # the first is at zero angle
+            mean = np.mean([here, *(self._projected(at(psi), psi) for psi in places)], axis=0)
             own = [getattr(self.planets(wave), "carrier", "") == carrier for wave in self.waves]
             found[own] = mean[own]
         return found
