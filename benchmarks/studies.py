@@ -111,7 +111,7 @@ def _in_processes(workers: int) -> Opens:
     from contextlib import contextmanager
 
     from exugear.studies.executors import Pool
-    from fe_ste.tools.threads import Workers
+    from fe_ste.tools.processes import Workers
 
     @contextmanager
     def opened() -> Any:

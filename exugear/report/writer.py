@@ -139,7 +139,7 @@ def write_report(
     allow_dir
         A further permitted folder for files that the gearbox file names. Scripts among them never run: their output
         must be stored in the folder.
-    executor : runs tasks in parallel where that saves time, such as `fe_ste.tools.threads.Workers`
+    executor : runs tasks in parallel where that saves time, such as `fe_ste.tools.processes.Workers`
     compare : results folder of another design to compare with
     quantity : quantity that ranks the resonances, as `[report] quantity` of the gearbox file, which it replaces
 

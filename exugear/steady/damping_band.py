@@ -25,7 +25,7 @@ from exugear.steady.settings import Method
 from exugear.system.kernels.modal_damping import modal_matrix
 from exugear.system.modal_damping import with_modal_damping
 from fe_ste.tools.arrays import Booleans, Floats, Integers, SingleComplexes
-from fe_ste.tools.threads import side_by_side
+from fe_ste.tools.processes import each_in_forks
 
 FACTORS = (0.5, 2.0)
 """Factors on the damping where the file states no range."""
@@ -87,7 +87,7 @@ def damping_band(model: HarmonicBalanceModel, method: Method, speed: Floats, amp
         own_signals = 2.0 * signals(damped[end], response)[line[point == at]]
         return np.stack([quantity.sizes(own_signals).max(axis=1) for quantity in quantities], axis=1)
 
-    sizes = iter(side_by_side(sizes_at, solves) if model.waves.neighbours else map(sizes_at, solves))
+    sizes = each_in_forks(sizes_at, solves)
     for at in np.unique(point):
         here = point == at
         for end in range(len(damped)):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass, fields, replace
 from functools import partial
 
@@ -54,7 +54,8 @@ from exugear.steady.settings import (
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers, SingleComplexes, Texts
 from fe_ste.tools.display import ReprMixin, TitledRows, value_range
-from fe_ste.tools.threads import one_dense_thread, side_by_side
+from fe_ste.tools.processes import each_in_forks
+from fe_ste.tools.threads import one_dense_thread
 
 LONGEST = 0.4
 """Longest step along a branch: in tenths of the static deflections, and in hundredths of the speed."""
@@ -303,8 +304,6 @@ SLOWEST_BRANCH = 0.01
 """Share of the fastest speed at which a branch from standstill begins."""
 LONGEST_WARNING = 300
 """Letters of a remark."""
-AT_ONCE = 2
-"""Speeds solved at the same time where stiffness varies with the carrier: nearly all of it is compiled code."""
 RESOLVED = 1e-4
 """Share of the exchanged power below which dissipated power is round-off."""
 ROUND_OFF = 1e-12
@@ -361,7 +360,7 @@ def response_of(
     else:
         points = _empty(solver.model, with_crossings(even, found))
         solve = partial(_solve_from, known=known, progress=report, keep=keep, keep_every=keep_every)
-        solve(points, 0, lambda: solver)
+        solve(points, 0, lambda: solver, follows=settings.method == "nonlinear")
         if at_resonances:
             points = _with_tops(solver, points, operation, solve)
         points = points.part(np.argsort(points.speed, kind="stable"))
@@ -480,8 +479,14 @@ def _solve_from(
     progress: Callable[[int, int], None],
     keep: Kept | None,
     keep_every: float,
+    follows: bool = False,
 ) -> None:
-    """Solve all points from one on; known ones are taken over."""
+    """Solve all points from one on; known ones are taken over.
+
+    Parameters
+    ----------
+    follows : whether each state begins with the one before; else points are solved on all cores
+    """
     count = first
     if known is not None:
         shared = min(len(known.speed), len(points.speed))
@@ -496,18 +501,22 @@ def _solve_from(
                 start.response(float(points.speed[count - 1]))
         for field in fields(SolvedPoints):
             getattr(points, field.name)[first:count] = getattr(known, field.name)[first:count]
+    speeds = points.speed[count:].tolist()
+    solved = (_solved_at(speed, solver()) for speed in speeds)
+    if not follows:
+        solved = each_in_forks(lambda speed: _solved_at(speed, solver()), speeds)
     kept = time.monotonic()
     done = count
     try:
-        at_once = AT_ONCE if solver().model.waves.neighbours else 1
-        for n in range(count, len(points.speed), at_once):
-            beyond = min(n + at_once, len(points.speed))
-            side_by_side(lambda at: _solve_one(points, at, solver()), range(n, beyond))
-            done = beyond
-            progress(done, len(points.speed))
-            if keep is not None and time.monotonic() - kept > keep_every:
-                keep(points.part(slice(done)))
-                kept = time.monotonic()
+        with closing(solved):
+            for point in solved:
+                for field in fields(SolvedPoints):
+                    getattr(points, field.name)[done] = getattr(point, field.name)[0]
+                done += 1
+                progress(done, len(points.speed))
+                if keep is not None and time.monotonic() - kept > keep_every:
+                    keep(points.part(slice(done)))
+                    kept = time.monotonic()
     except KeyboardInterrupt:
         if keep is not None and done:
             keep(points.part(slice(done)))
@@ -541,17 +550,19 @@ def _change_with_more(solver: PointSolver, solved: SolvedPoints) -> float:
     return max(changes)
 
 
-def _solve_one(out: SolvedPoints, n: int, solver: PointSolver) -> None:
-    """Solve point n, or enter why it has no steady state; the others do not suffer from that."""
+def _solved_at(speed: float, solver: PointSolver) -> SolvedPoints:
+    """Solve a point, or enter why it has no steady state; the others do not suffer from that."""
+    out = _empty(solver.model, np.array([speed]))
     try:
-        _fill(out, n, solver.model, solver.response(float(out.speed[n])))
+        _fill(out, 0, solver.model, solver.response(speed))
     except HarmonicBalanceError as error:
         for values in (out.amplitude, out.drive_torque, out.energy_error, out.apart, out.free):
-            values[n] = np.nan
-        out.remark[n] = str(error)[:LONGEST_WARNING]
-        return
+            values[0] = np.nan
+        out.remark[0] = str(error)[:LONGEST_WARNING]
+        return out
     if solver.state is not None:
-        out.growth[n], out.remark[n] = solver.state.growth, solver.state.remark[:LONGEST_WARNING]
+        out.growth[0], out.remark[0] = solver.state.growth, solver.state.remark[:LONGEST_WARNING]
+    return out
 
 
 def _follow_branch(

@@ -41,7 +41,8 @@ from exugear.studies.quantities import Output
 from exugear.studies.sampling import changed
 from exugear.system.gearbox_checks import check_parts
 from fe_ste.tools.files import FileError, open_regular, write_all
-from fe_ste.tools.threads import AtOnce, Workers, WorkerStoppedError, available_cores, stop_if_asked
+from fe_ste.tools.processes import Workers, WorkerStoppedError, stop_if_asked
+from fe_ste.tools.threads import AtOnce, available_cores
 
 # Journals of finished points: one line per point, keyed by the hash of its input, complete or ignored
 

@@ -37,8 +37,8 @@ from exugear.system.tooth_mesh.tables import TableRequest, requested_tables, tab
 from exugear.transient.runup import Solver, simulate
 from exugear.transient.start import refuse_to_resume
 from fe_ste.root_stress import MeshCycleStress
+from fe_ste.tools.processes import stop_if_asked
 from fe_ste.tools.stores import Store
-from fe_ste.tools.threads import stop_if_asked
 from fe_ste.transmission_error.table import MeshTable, prepared_compliance
 from fe_ste.transmission_error.transmission_error import static_transmission_error
 

@@ -3,25 +3,18 @@
 OpenBLAS keeps its threads spinning between calls. On a machine whose cores others use too, or that runs several
 computations in parallel, that costs 10 to 80 times what a second thread could gain on matrices of a few hundred rows.
 Complete computations in parallel gain more than threads within each of them.
-
-This module loads no library: a worker monitors that process before it loads its own libraries.
 """
 
 from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
 import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
-from contextlib import contextmanager, suppress
-from multiprocessing import get_context
-from multiprocessing.connection import Connection
-from multiprocessing.synchronize import Event
-from types import TracebackType
+from concurrent.futures import Executor, Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from threadpoolctl import ThreadpoolController
@@ -175,61 +168,3 @@ def available_cores() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
-
-
-# Worker processes that end with the process that started them
-
-
-class Workers(ProcessPoolExecutor):
-    """Worker processes on a lifeline: a pipe that the system closes when the process that started them ends.
-
-    An exception that leaves the ``with`` of the executor drops what waits, and stops what asks `stop_if_asked`.
-
-    Notes
-    -----
-    Workers are started afresh, not forked: a script that uses them needs the usual ``if __name__ == "__main__":``.
-    """
-
-    def __init__(self, workers: int = 2) -> None:
-        context = get_context("spawn")
-        watched, self._lifeline = context.Pipe(duplex=False)
-        self._stop = context.Event()
-        super().__init__(workers, mp_context=context, initializer=_begin, initargs=(watched, self._stop))
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> bool | None:
-        """Wait for what was submitted; after an error drop and stop it."""
-        if error is not None:
-            self._stop.set()
-            self.shutdown(cancel_futures=True)
-        return super().__exit__(kind, error, trace)
-
-
-class WorkerStoppedError(RuntimeError):
-    """The process that started a worker wants its result no more."""
-
-
-def stop_if_asked() -> None:
-    """End the work of a worker whose result is wanted no more; calls that take long ask between their steps."""
-    if _asked is not None and _asked.is_set():
-        raise WorkerStoppedError
-
-
-_asked: Event | None = None
-
-
-def _begin(lifeline: Connection, asked: Event) -> None:
-    """Prepare a worker; signals of the terminal are for the process that started it."""
-    global _asked
-    _asked = asked
-    for name in ("SIGINT", "SIGHUP"):
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
-    threading.Thread(target=_end_with, args=(lifeline,), daemon=True).start()
-
-
-def _end_with(lifeline: Connection) -> None:
-    with suppress(EOFError, OSError):
-        lifeline.recv_bytes()  # nothing is ever sent
-    os._exit(1)

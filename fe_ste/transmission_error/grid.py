@@ -24,8 +24,8 @@ import numpy as np
 
 from fe_ste.tools.arrays import Booleans
 from fe_ste.tools.files import FileError
+from fe_ste.tools.processes import Workers, stop_if_asked
 from fe_ste.tools.stores import Layout, load_dataset, write_dataset
-from fe_ste.tools.threads import Workers, stop_if_asked
 from fe_ste.tools.versions import TABLE
 from fe_ste.transmission_error.compliance import PairCompliance
 from fe_ste.transmission_error.states import RESULTS, STATE_AXES, StateAxes, StateResults

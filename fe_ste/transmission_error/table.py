@@ -26,8 +26,8 @@ from fe_ste.geometry.gear_relations import inputs_that_are_given
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 from fe_ste.tools.files import FileError
+from fe_ste.tools.processes import Workers
 from fe_ste.tools.stores import Layout, load_dataset, write_dataset
-from fe_ste.tools.threads import Workers
 from fe_ste.tools.versions import TABLE
 from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
 from fe_ste.transmission_error.cycle import DEFAULT_POSITIONS

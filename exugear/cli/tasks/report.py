@@ -33,7 +33,8 @@ from exugear.system.gearbox_checks import usual_variant
 from exugear.system.modes import load_modes
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.files import FileError
-from fe_ste.tools.threads import Workers, available_cores
+from fe_ste.tools.processes import Workers
+from fe_ste.tools.threads import available_cores
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,8 @@ from fe_ste.geometry.checks import GeometryError
 from fe_ste.reference.newton import Iteration
 from fe_ste.reference.table import NonlinearTable
 from fe_ste.tools.drawing import RenderingError
-from fe_ste.tools.threads import Workers, available_cores
+from fe_ste.tools.processes import Workers
+from fe_ste.tools.threads import available_cores
 from fe_ste.transmission_error.cycle import HARMONICS
 from fe_ste.transmission_error.table import MeshTable
 

@@ -23,7 +23,7 @@ from exugear.system.bearings.rolling.rows import BearingError
 from exugear.system.sensitivity import Parameter, ParameterVariation, assumed_parameters, vary_parameter
 from exugear.system.statics import BalanceError
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.threads import stop_if_asked
+from fe_ste.tools.processes import stop_if_asked
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -15,7 +15,7 @@ from exugear.steady.balance.model import HarmonicBalanceModel
 from exugear.steady.balance.response import parametric_response
 from exugear.steady.mean_system.mean_system import Steps
 from fe_ste.tools.arrays import Complexes, Floats
-from fe_ste.tools.threads import side_by_side
+from fe_ste.tools.processes import each_in_forks
 
 CARRIED = (1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
 """Shares of the deflections of all meshes that a line has to have at one of the speeds, tried one after the other.
@@ -79,7 +79,7 @@ def with_needed_neighbours(
 def _vibrations(
     model: HarmonicBalanceModel, speeds: Floats, prepared: Steps | None
 ) -> list[tuple[Complexes, Complexes]]:
-    """Vibration at each of the speeds (rad/s), two at a time."""
+    """Vibration at each of the speeds, rad/s."""
 
     def vibration(speed: float) -> tuple[Complexes, Complexes]:
         """Overall transmission error and deflections of the meshes (n, 1 + m), m; their forces (n, m), N."""
@@ -87,9 +87,9 @@ def _vibrations(
         overall = response.motion @ model.row_of_overall(speed)
         return np.column_stack([overall, response.deflection]), response.force
 
-    found: list[tuple[Complexes, Complexes]] = []
-    while len(found) < len(speeds):
-        found += side_by_side(vibration, speeds[len(found) : len(found) + 2].tolist())
+    found = []
+    for vibrating in each_in_forks(vibration, speeds.tolist()):
+        found.append(vibrating)
         if prepared is not None:
             prepared(f"choice of {len(model.lines.index)} orders", len(found), len(speeds))
     return found

@@ -11,14 +11,14 @@ from pathlib import Path
 
 import pytest
 
-from fe_ste.tools.threads import Workers, WorkerStoppedError, stop_if_asked
+from fe_ste.tools.processes import Workers, WorkerStoppedError, stop_if_asked
 
 pytestmark = pytest.mark.usefixtures("terminal_signals")
 ROOT = Path(__file__).parents[3]
 #: Two workers that sleep, and more calls, too long for the pipe to the workers, that wait.
 SLEEPERS = """
 import os, signal, sys, time
-from fe_ste.tools.threads import Workers
+from fe_ste.tools.processes import Workers
 
 def stop(*_):
     raise KeyboardInterrupt

@@ -19,7 +19,7 @@ from fe_ste.contact.kinematics import ContactSettings
 from fe_ste.elasticity.flank import flank_compliance
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.flanks import FlankModification
-from fe_ste.tools.threads import Workers
+from fe_ste.tools.processes import Workers
 from fe_ste.transmission_error.compliance import PairCompliance
 from fe_ste.transmission_error.grid import Checkpoint, GridError, solve_grid
 from fe_ste.transmission_error.search import contact_state, unloaded_states
