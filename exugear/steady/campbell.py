@@ -25,6 +25,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -104,13 +105,15 @@ def mode_tracks(modes_at: Callable[[float], Found], low: float, high: float) -> 
     even = np.linspace(low, high, COUNT).tolist()
     found = dict(zip(even, side_by_side(modes_at, even), strict=True))
     narrowest = NARROWEST * abs(high - low)
+
+    @cache
+    def clarity(a: float, b: float) -> float:
+        """Clarity of the step between two speeds."""
+        return _clarity(found[a], found[b], narrowest / (b - a))
+
     while len(found) < MOST:
         speeds = sorted(found)
-        steps = [
-            (_clarity(found[a], found[b], narrowest / (b - a)), 0.5 * (a + b))
-            for a, b in itertools.pairwise(speeds)
-            if b - a > narrowest
-        ]
+        steps = [(clarity(a, b), 0.5 * (a + b)) for a, b in itertools.pairwise(speeds) if b - a > narrowest]
         unclear = min(steps, default=(1.0, 0.0))
         if unclear[0] >= CLEAR:
             break
@@ -119,11 +122,10 @@ def mode_tracks(modes_at: Callable[[float], Found], low: float, high: float) -> 
     return _joined(np.array(speeds), [found[speed] for speed in speeds])
 
 
-def _matches(one: Found, other: Found) -> tuple[Integers, Integers, Floats]:
-    """Pairs of modes that are one, each used once so that the sum of the MAC is largest, and their MAC."""
+def _matches(values: Floats) -> tuple[Integers, Integers, Floats]:
+    """Pairs of modes that are one, each used once so that the sum of the MAC (n, m) is largest, and their MAC."""
     import scipy.optimize  # a quarter of a second that others need not wait
 
-    values = assurance(one, other)
     rows, columns = scipy.optimize.linear_sum_assignment(values, maximize=True)
     kept = values[rows, columns] >= LEAST
     rows = rows[kept]
@@ -133,13 +135,14 @@ def _matches(one: Found, other: Found) -> tuple[Integers, Integers, Floats]:
 
 def _clarity(one: Found, other: Found, narrowest: float) -> float:
     """Minimum MAC for modes to be matched across a step, or less than `CLEAR` where a veering may be hidden in it."""
-    rows, columns, values = _matches(one, other)
+    whole = assurance(one, other)
+    rows, columns, values = _matches(whole)
     before, after = (modes[0][places].imag for modes, places in ((one, rows), (other, columns)))
     far = np.triu(np.subtract.outer(before, before), 1)
     near = np.triu(np.subtract.outer(after, after), 1)
     first, second = np.nonzero(far * near < 0.0)
     apart = np.abs(far[first, second]), np.abs(near[first, second])
-    cross = assurance(one, other)[rows[first], columns[second]]
+    cross = whole[rows[first], columns[second]]
     share = 2.0 * np.sqrt(cross) / (1.0 / apart[0] + 1.0 / apart[1]) / (apart[0] + apart[1])
     hidden = share[share > narrowest].max(initial=0.0)
     clear = float(values.min(initial=1.0))
@@ -151,7 +154,7 @@ def _joined(speeds: Floats, found: list[Found]) -> ModeTracks:
     places = [list(range(len(found[0][0])))]
     count = len(found[0][0])
     for before, after in itertools.pairwise(found):
-        rows, columns, _ = _matches(before, after)
+        rows, columns, _ = _matches(assurance(before, after))
         tracks = dict(zip(columns.tolist(), (places[-1][row] for row in rows), strict=True))
         new = [n for n in range(len(after[0])) if n not in tracks]
         tracks |= {n: count + number for number, n in enumerate(new)}

@@ -304,6 +304,8 @@ SLOWEST_BRANCH = 0.01
 """Share of the fastest speed at which a branch from standstill begins."""
 LONGEST_WARNING = 300
 """Letters of a remark."""
+KEPT_AT_MOST = 30.0
+"""Time between two writes of the points that are solved, over the time of a write."""
 RESOLVED = 1e-4
 """Share of the exchanged power below which dissipated power is round-off."""
 ROUND_OFF = 1e-12
@@ -329,7 +331,7 @@ def response_of(
     progress : called with the number of points that are solved, and of all
     keep : callable, optional
         Called with the points that are solved, at times.
-    keep_every : seconds between them
+    keep_every : seconds between them at least
     prepared : called before the first point with the steps of the preparation
     """
     check_speeds(assembly.gearbox, settings.speeds)
@@ -515,8 +517,11 @@ def _solve_from(
                 done += 1
                 progress(done, len(points.speed))
                 if keep is not None and time.monotonic() - kept > keep_every:
+                    begin = time.monotonic()
                     keep(points.part(slice(done)))
                     kept = time.monotonic()
+                    # Hundreds of megabytes take seconds to write: most of the time is left to the solution.
+                    keep_every = max(keep_every, KEPT_AT_MOST * (kept - begin))
     except KeyboardInterrupt:
         if keep is not None and done:
             keep(points.part(slice(done)))

@@ -9,6 +9,7 @@ This module loads no library: a worker monitors the process that started it befo
 
 from __future__ import annotations
 
+import ctypes
 import logging
 import os
 import signal
@@ -164,6 +165,9 @@ class _Forks(ProcessPoolExecutor):
         return super().__exit__(kind, error, trace)
 
 
+#: Numbers of parameters of the C library's `mallopt`, from its header.
+_TRIM_THRESHOLD, _MMAP_MAX = -1, -4
+
 _inherited: _Inherited | None = None
 
 
@@ -173,6 +177,11 @@ def _begin_fork(watched: Connection, inherited: _Inherited) -> None:
     _inherited = inherited
     inherited.lifeline.close()
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    with suppress(AttributeError):  # a C library without it
+        # Each item allocates what the one before it freed. New pages for it cost a quarter of the time.
+        set_option = ctypes.CDLL(None).mallopt
+        set_option(_MMAP_MAX, 0)
+        set_option(_TRIM_THRESHOLD, 2**31 - 1)
     logging.disable()
     sys.stdout = sys.stderr = open(os.devnull, "w")  # noqa: SIM115 - as long as the fork lives
     _live_on(watched)

@@ -52,6 +52,8 @@ TOLERANCE = 1e-9
 """Residual of the balance over the static deflections."""
 PASSING_TOLERANCE = 1e-6
 """The same where stiffness varies with the carrier: neighbours that are left out are larger by far."""
+ROUGH_TOLERANCE = 1e-4
+"""The same of solutions that only say how far positions move: a hundredth of their forces at most comes from that."""
 POSITIONS_REPEATED = 2
 """Solutions after the first one, with positions in the mesh cycle that move with the orders of shafts."""
 LARGEST_SHIFT = 0.1
@@ -286,7 +288,7 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
         whole = np.hstack([(given + moved).reshape(shape[0], -1), of_bearings])
         start = still - (answers @ whole[..., None])[..., 0]
         before = found
-        found, more = balance.solve(start, before)
+        found, more = balance.solve(start, before, rough=bool(again and model.varying))
         products += more
         excess = whole + balance.forces(found)
         deflection = (found / lengths)[:, :of_meshes].reshape(shape)[..., DEFLECTION]
@@ -376,9 +378,10 @@ class LineBalance:
         """Return the forces (n, k) K y."""
         return self._coupling.of_flat(self._flat, readings) + self._dampers(readings)
 
-    def solve(self, right: Complexes, start: Complexes | None) -> tuple[Complexes, int]:
+    def solve(self, right: Complexes, start: Complexes | None, rough: bool = False) -> tuple[Complexes, int]:
         """Solve for readings (n, k); the products with K that it took follow."""
         tolerance = PASSING_TOLERANCE if self.passing else TOLERANCE
+        tolerance = ROUGH_TOLERANCE if rough else tolerance
         return solve_lines(self._apply, solve_one_by_one(self.passing, right), tolerance, start)
 
 

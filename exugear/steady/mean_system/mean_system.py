@@ -38,6 +38,7 @@ from exugear.system.statics import (
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Complexes, Floats, Integers
 from fe_ste.tools.display import ReprMixin
+from fe_ste.tools.processes import each_in_forks
 
 Values = TypeVar("Values", Floats, Complexes)
 Steps: TypeAlias = Callable[[str, int, int], None]
@@ -572,17 +573,22 @@ def _changes_over_places(
     without = frame.without_varying
     still = stiffness[1] if without is frame else _stiffness_at_rest(without, 0.0, u)
     size = np.sqrt(np.abs(np.diag(stiffness[1])).clip(min=1e-3 * np.abs(np.diag(stiffness[1])).max()))
-    for place, psi in enumerate(places[1:].tolist(), start=1):
-        masses[place] = _mass(frame, psi, u) - mass
-        dampings[place] = _damping(frame, psi, speed, u) - damping
+
+    def at_place(psi: float) -> tuple[Floats, Floats, Floats, Floats]:
+        """Return changes of M, C (n, n) and K (3, n, n) at an angle, and K without what is known to vary."""
+        changes = np.zeros((3, *mass.shape))
         if without is frame:
             turned = _stiffness(frame, psi, speed, u)
-            stiffnesses[:, place] = turned - stiffness[1]
+            changes[:] = turned - stiffness[1]
         else:
             turned = _stiffness_at_rest(without, psi, u)
             for n in (0, 2):
-                stiffnesses[n, place] = _stiffness(frame, psi, float(speeds[n]), static[n]) - stiffness[n]
-            stiffnesses[1, place] = 0.5 * (stiffnesses[0, place] + stiffnesses[2, place])
+                changes[n] = _stiffness(frame, psi, float(speeds[n]), static[n]) - stiffness[n]
+            changes[1] = 0.5 * (changes[0] + changes[2])
+        return _mass(frame, psi, u) - mass, _damping(frame, psi, speed, u) - damping, changes, turned
+
+    for place, found in enumerate(each_in_forks(at_place, places[1:].tolist()), start=1):
+        masses[place], dampings[place], stiffnesses[:, place], turned = found
         change = float(np.abs((turned - still) / np.outer(size, size)).max())
         if change > most:
             raise SteadyError(
