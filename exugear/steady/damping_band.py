@@ -9,7 +9,6 @@ for methods that are linear in the deflections only: with contact loss another d
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -24,7 +23,7 @@ from exugear.steady.mean_system.signals import Quantity
 from exugear.steady.settings import Method
 from exugear.system.kernels.modal_damping import modal_matrix
 from exugear.system.modal_damping import with_modal_damping
-from fe_ste.tools.arrays import Booleans, Floats, Integers, SingleComplexes
+from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers, SingleComplexes
 from fe_ste.tools.processes import each_in_forks
 
 FACTORS = (0.5, 2.0)
@@ -33,6 +32,9 @@ MOST_PEAKS = 20
 """Highest peaks of each quantity that are solved again."""
 BESIDE = 0.004
 """Distance of the speeds on either side of a peak at which it is solved again, relative to its own speed."""
+RELEVANT, BESIDE_PEAK = 3e-4, 0.03
+"""Shares of the deflections of the meshes, and of those in the line of a peak, from which a line beside others is
+solved again with the peak."""
 MOST_RISE = 1.1
 """Limit of the top of a curve, over the highest amplitude that was solved."""
 
@@ -77,24 +79,58 @@ def damping_band(model: HarmonicBalanceModel, method: Method, speed: Floats, amp
     point, line, rises = _highest_peaks(model, quantities, speed, amplitude)
     found = np.zeros((len(point), len(quantities), 2))
     respond = {"linear": linear_response, "parametric": parametric_response}[method]
-    damped = [model.with_system(system) for system in damping_limits(model.system)]
-    solves = list(product(np.unique(point), range(len(damped)), (-BESIDE, 0.0, BESIDE)))
+    ends = damping_limits(model.system)
 
-    def sizes_at(solve: tuple[int, int, float]) -> Floats:
-        """Sizes (lines, s) of the quantities in one solution."""
-        at, end, beside = solve
-        response = respond(damped[end], damped[end].at(float(speed[at]) * (1.0 + beside)))
-        own_signals = 2.0 * signals(damped[end], response)[line[point == at]]
-        return np.stack([quantity.sizes(own_signals).max(axis=1) for quantity in quantities], axis=1)
+    def limits_at(at: int) -> Floats:
+        """Amplitudes (peaks, s, 2) of the peaks at one point."""
+        own = line[point == at]
+        few = with_relevant_lines(model, amplitude[at], own)
+        places = few.lines.find(model.lines.index[own])[0]
 
-    sizes = each_in_forks(sizes_at, solves)
-    for at in np.unique(point):
-        here = point == at
-        for end in range(len(damped)):
-            before, middle, after = (next(sizes) for _ in range(3))
+        def sizes(damped: HarmonicBalanceModel, beside: float = 0.0) -> Floats:
+            """Sizes (peaks, s) of the quantities."""
+            response = respond(damped, damped.at(float(speed[at]) * (1.0 + beside)))
+            return sizes_of(2.0 * signals(damped, response)[places])
+
+        def sizes_of(own_signals: Complexes) -> Floats:
+            return np.stack([quantity.sizes(own_signals).max(axis=1) for quantity in quantities], axis=1)
+
+        limits = np.zeros((len(own), len(quantities), 2))
+        for end, system in enumerate(ends):
+            damped = few.with_system(system)
+            before, middle, after = (sizes(damped, beside) for beside in (-BESIDE, 0.0, BESIDE))
             # A quantity without a peak there counts at the peak's speed: beside it others may rise.
-            found[here, :, end] = np.where(rises[here], resonance_top(before, middle, after), middle)
+            limits[..., end] = np.where(rises[point == at], resonance_top(before, middle, after), middle)
+        if few is model:
+            return limits
+        # What the lines left out add is taken to change with the damping as all others do.
+        present = sizes_of(amplitude[at, own].astype(np.complex128))
+        return np.asarray(limits * (present / np.maximum(sizes(few), 1e-300))[..., None])
+
+    points = np.unique(point).tolist()
+    for at, limits in zip(points, each_in_forks(limits_at, points), strict=True):
+        found[point == at] = limits
     return DampingBand(point, line, found, tuple(quantity.name for quantity in quantities))
+
+
+def with_relevant_lines(
+    model: HarmonicBalanceModel, amplitude: SingleComplexes, wanted: Integers
+) -> HarmonicBalanceModel:
+    """Leave out lines beside others that hardly vibrate at one point; where nothing couples them, all lines stay.
+
+    Parameters
+    ----------
+    amplitude : (lines, signals) of the response there
+    wanted : lines that stay
+    """
+    if not model.waves.neighbours:
+        return model
+    read = [name.quantity == "mesh_dte" for name in model.signal_names]
+    deflection = np.linalg.norm(np.abs(amplitude[:, read]).astype(np.float64), axis=1)
+    least = min(RELEVANT * float(np.linalg.norm(deflection[1:])), BESIDE_PEAK * float(deflection[wanted].min()))
+    kept = ~model.beside_others | (deflection > least)
+    kept[wanted] = True
+    return model.of(kept)
 
 
 def resonance_top(before: Floats, middle: Floats, after: Floats) -> Floats:

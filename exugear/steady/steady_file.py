@@ -232,8 +232,9 @@ def complex_amplitudes(data: xr.Dataset, signals: Sequence[int] | None = None) -
     phase = data["phase"].to_numpy()[..., some]
     size = data["amplitude"].to_numpy()[..., some]
     found = np.empty(size.shape, dtype=np.complex64)
-    found.real = size * np.cos(phase)
-    found.imag = size * np.sin(phase)
+    for out, own, angle in zip(found, size, phase, strict=True):  # point by point: temporary arrays stay in the cache
+        out.real = own * np.cos(angle)
+        out.imag = own * np.sin(angle)
     return found
 
 

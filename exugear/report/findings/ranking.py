@@ -227,7 +227,8 @@ def ranking_of(data: xr.Dataset, speeds: tuple[float, float] | None = None, want
     Forces and accelerations of planets are root mean squares over the planets, from the mean component that all planets
     share and the cosine and sine components around the carrier.
     """
-    speed = np.abs(data["speed"].to_numpy().astype(np.float64))
+    signed = data["speed"].to_numpy().astype(np.float64)
+    speed = np.abs(signed)
     low, high, whole = _range(json.loads(str(data.attrs["operating_range"])) if speeds is None else speeds, speed)
     inside = (speed >= low) & (speed <= high)
     amplitude = complex_amplitudes(data)[:, 1:]
@@ -269,7 +270,7 @@ def ranking_of(data: xr.Dataset, speeds: tuple[float, float] | None = None, want
             where = quantity.places[int(at.argmax())]
             amplitudes[quantity.name] = PeakAmplitude(float(at.max()), where, rank, limits)
         order = float(orders[line])
-        at_speed = float(data["speed"][first_point])
+        at_speed = float(signed[first_point])
         frequency = order * abs(at_speed) / (2.0 * np.pi)
         found.append(Resonance(names[line], order, at_speed, frequency, amplitudes))
     carried = {bool(carrier) for carrier in json.loads(str(data.attrs["carried_seats"])).values()}
