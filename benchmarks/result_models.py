@@ -141,6 +141,7 @@ def steady_section(part: Results) -> str:
             row["method"],
             "yes" if row["refined"] else "no",
             str(row["speeds"]),
+            duration(row["wall_s"]),
             duration(row["processor_s"]),
             duration(row["processor_s"] / row["speeds"]),
             f"{row['processor_s'] / part['run_ups'][row['variant']]:.2g}",
@@ -160,10 +161,10 @@ def steady_section(part: Results) -> str:
         [
             "## Steady-state response\n",
             f"{circumstances(part)} GRC, 400 speeds of the carrier from 0 to 215 rpm, mean system and signals "
-            f"included; processor time of one thread; flexible is that with elastic shafts. The last column is over "
-            f"the processor time of a run-up of 30 s.\n",
+            f"included; wall time, and processor time of all processes; flexible is that with elastic shafts. The "
+            f"last column is over the processor time of a run-up of 30 s.\n",
             table(
-                ["variant", "coordinates", "method", "speeds added", "speeds", "all", "a speed", "run-ups"],
+                ["variant", "coordinates", "method", "speeds added", "speeds", "wall", "all", "a speed", "run-ups"],
                 rows,
             ),
             "Lines, variant bushing, method parametric, no speeds added:\n",

@@ -49,7 +49,7 @@ LINES = ((10, 3), (10, 5), (16, 4), (20, 3))
 
 
 def cost_of(assembly: Assembly, settings: SteadySettings) -> dict[str, Any]:
-    """Processor time of a response, and what it solved: once, for it takes seconds."""
+    """Cost of a response, and what it solved: once, for it takes seconds."""
     found: list[Any] = []
     cost = timed(lambda: found.append(response_of(assembly, settings)))
     return {
@@ -57,6 +57,7 @@ def cost_of(assembly: Assembly, settings: SteadySettings) -> dict[str, Any]:
         "lines": len(found[0].lines.orders),
         "speeds": len(found[0].solved.speed),
         "processor_s": cost.processor,
+        "wall_s": cost.wall,
     }
 
 

@@ -53,7 +53,7 @@ TOLERANCE = 1e-9
 PASSING_TOLERANCE = 1e-6
 """The same where stiffness varies with the carrier: neighbours that are left out are larger by far."""
 ROUGH_TOLERANCE = 1e-4
-"""The same of solutions that only say how far positions move: a hundredth of their forces at most comes from that."""
+"""The same of solutions that only tell how far positions move, which changes forces by a hundredth."""
 POSITIONS_REPEATED = 2
 """Solutions after the first one, with positions in the mesh cycle that move with the orders of shafts."""
 LARGEST_SHIFT = 0.1
