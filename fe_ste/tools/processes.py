@@ -34,6 +34,8 @@ Result = TypeVar("Result")
 
 #: Seconds of work for which a fork is worth its start.
 _WORTH_A_FORK = 0.1
+#: Seconds of work that are sent to a fork together: each sending takes a millisecond.
+_SENT_AT_ONCE = 0.03
 
 
 class _Inherited(NamedTuple):
@@ -113,7 +115,7 @@ def each_in_forks(function: Callable[[Item], Result], items: Iterable[Item]) -> 
     Raises
     ------
     Exception
-        That of the function for the next item.
+        That of the function for one of the next items.
 
     Examples
     --------
@@ -130,12 +132,14 @@ def each_in_forks(function: Callable[[Item], Result], items: Iterable[Item]) -> 
     count = min(available_cores(), len(waiting), int(took * len(waiting) / _WORTH_A_FORK))
     if count > 1 and sys.platform == "linux" and second_core_is_free():
         # A fork that the system ended, mostly for its memory, leaves its item and those that follow to this process.
+        at_once = max(1, min(int(_SENT_AT_ONCE / took), len(waiting) // (4 * count)))
         with suppress(BrokenExecutor), _Forks(count, function) as forks:
-            futures = deque(forks.submit_all(waiting))
+            items = list(waiting)
+            futures = deque(forks.submit_all([items[n : n + at_once] for n in range(0, len(items), at_once)]))
             while futures:
-                found = futures.popleft().result()
-                waiting.popleft()
-                yield found
+                for found in futures.popleft().result():
+                    waiting.popleft()
+                    yield found
     yield from map(function, waiting)
 
 
@@ -148,12 +152,12 @@ class _Forks(ProcessPoolExecutor):
         inherited = _Inherited(self._lifeline, function)
         super().__init__(count, mp_context=context, initializer=_begin_fork, initargs=(watched, inherited))
 
-    def submit_all(self, items: Iterable[Any]) -> list[Any]:
-        """Let the forks call the function for each item."""
+    def submit_all(self, parts: Iterable[list[Any]]) -> list[Any]:
+        """Let the forks call the function for each item of some parts."""
         with warnings.catch_warnings():
             # Python 3.12 and later warn of locks that other threads hold: forks use none that this process may share.
             warnings.simplefilter("ignore", DeprecationWarning)
-            return [self.submit(_call, item) for item in items]
+            return [self.submit(_call, part) for part in parts]
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -187,6 +191,6 @@ def _begin_fork(watched: Connection, inherited: _Inherited) -> None:
     _live_on(watched)
 
 
-def _call(item: Any) -> Any:
+def _call(items: list[Any]) -> list[Any]:
     assert _inherited is not None
-    return _inherited.function(item)
+    return [_inherited.function(item) for item in items]

@@ -68,6 +68,16 @@ def test_a_function_that_cannot_be_sent_and_what_it_holds_are_known_to_forks() -
     assert list(each_in_forks(times, range(20))) == [3 * n for n in range(20)]
 
 
+def test_quick_items_are_sent_in_parts_whose_results_are_in_order() -> None:
+    def short(item: int) -> tuple[int, int]:
+        time.sleep(0.003)
+        return item, os.getpid()
+
+    found = list(each_in_forks(short, range(203)))
+    assert [item for item, _ in found] == list(range(203))
+    assert len({process for _, process in found}) == 3
+
+
 def test_quick_items_are_left_to_this_process() -> None:
     assert set(each_in_forks(lambda _: os.getpid(), range(20))) == {os.getpid()}
 
