@@ -108,8 +108,9 @@ def _end_with(lifeline: Connection) -> None:
 def each_in_forks(function: Callable[[Item], Result], items: Iterable[Item]) -> Generator[Result, None, None]:
     """Call a function for each item on all cores and yield the results in the order of the items.
 
-    The first two items are computed by this process, which loads what the function needs and shows how long an item
-    takes. Forks compute the others where they are worth their start; else, in a worker and in a fork this process does.
+    This process computes the first two items, which loads what the function needs and shows how long an item takes.
+    Forks compute the others where that saves time. Where they cannot be started or are lost, in a worker, in a fork and
+    on other systems than Linux, this process computes them.
     Results are the same to the bit. The function must not print, log or change anything but its result.
 
     Raises
@@ -131,9 +132,9 @@ def each_in_forks(function: Callable[[Item], Result], items: Iterable[Item]) -> 
         yield result
     count = min(available_cores(), len(waiting), int(took * len(waiting) / _WORTH_A_FORK))
     if count > 1 and sys.platform == "linux" and second_core_is_free():
-        # A fork that the system ended, mostly for its memory, leaves its item and those that follow to this process.
         at_once = max(1, min(int(_SENT_AT_ONCE / took), len(waiting) // (4 * count)))
-        with suppress(BrokenExecutor), _Forks(count, function) as forks:
+        # The system may end a fork for its memory, or have no process or semaphore left: items without a result wait.
+        with suppress(BrokenExecutor, OSError, NotImplementedError), _Forks(count, function) as forks:
             items = list(waiting)
             futures = deque(forks.submit_all([items[n : n + at_once] for n in range(0, len(items), at_once)]))
             while futures:

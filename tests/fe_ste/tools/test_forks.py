@@ -16,6 +16,8 @@ import fe_ste.tools.processes
 import fe_ste.tools.threads
 from fe_ste.tools.processes import each_in_forks
 
+from .test_workers import is_alive
+
 pytestmark = [
     pytest.mark.usefixtures("terminal_signals"),
     pytest.mark.skipif(sys.platform != "linux", reason="forks exist on Linux alone"),
@@ -116,6 +118,19 @@ def test_this_process_goes_on_where_a_fork_was_ended() -> None:
     assert list(each_in_forks(end, range(40))) == list(range(40))
 
 
+def test_this_process_goes_on_where_no_fork_can_be_started(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without a process left (`os.fork`), and without memory for semaphores (a full ``/dev/shm``)."""
+
+    def none_left(*_: object, **__: object) -> int:
+        raise OSError(28, "No space left on device")
+
+    for name in ("os.fork", "multiprocessing.synchronize.SemLock.__init__"):
+        with monkeypatch.context() as patched:
+            patched.setattr(name, none_left)
+            found = list(each_in_forks(slow, range(12)))
+        assert found == [(item, os.getpid()) for item in range(12)]
+
+
 def test_an_interrupt_ends_forks_that_are_busy() -> None:
     def sleep(item: int) -> int:
         time.sleep(0.1 if item < 3 else 600.0)
@@ -149,12 +164,3 @@ def test_forks_end_with_the_process_that_started_them(number: int, tmp_path: Pat
     while any(map(is_alive, forks)) and time.monotonic() < deadline:
         time.sleep(0.02)
     assert not any(map(is_alive, forks))
-
-
-def is_alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    state = Path(f"/proc/{pid}/stat")
-    return state.exists() and state.read_text(encoding="utf-8").rpartition(")")[2].split()[0] != "Z"
