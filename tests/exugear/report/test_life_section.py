@@ -27,6 +27,7 @@ def project(tmp_path, monkeypatch) -> Project:
     return Project(gearbox, tmp_path / "out", Choice("bushing", "line_of_action"))
 
 
+@pytest.mark.validation
 def test_a_report_knows_a_life_whose_stresses_come_from_tables_of_its_own(project):
     """Gears that stand askew on their bearings."""
     askew = project.gearbox.varied({"bearings.bearing_1.z_mm": 20.0})

@@ -248,6 +248,7 @@ def test_pins_that_are_hardly_displaced_change_nothing_else():
     assert max(abs(displaced[order] - value) for order, value in without.items()) < 1e-7 * size
 
 
+@pytest.mark.validation
 def test_the_power_of_displaced_pins_is_what_the_dampers_dissipate(grc, stiffness):
     """Bearings of the planets are unequal, too."""
     assembly = assemble(grc.varied({"pins": LATE}), Choice("bushing"), stiffness)

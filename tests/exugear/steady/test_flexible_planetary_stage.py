@@ -212,6 +212,7 @@ def test_lines_that_are_left_out_change_the_others_by_what_is_told(solver, respo
     assert np.linalg.norm(found - known) < 1.01 * changed * np.linalg.norm(known)
 
 
+@pytest.mark.validation
 def test_lines_that_are_left_out_at_a_peak_hardly_change_its_range_of_damping(solver, monkeypatch):
     """All peaks of a hundredth of the highest one within 3 %, half of them within 0.2 %."""
     speed = np.linspace(7.6, 8.4, 7)
@@ -230,6 +231,7 @@ def test_lines_that_are_left_out_at_a_peak_hardly_change_its_range_of_damping(so
     assert np.median(errors[counted]) < 2e-3
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize("place", [1, 2])
 def test_frequencies_at_an_angle_of_the_carrier_are_those_of_a_stage_built_at_it(grc, stiffness, tmp_path, place):
     """An oval ring: a second gearbox file has its planets where those of the first arrive; its modes are at zero angle.

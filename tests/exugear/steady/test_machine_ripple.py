@@ -297,6 +297,7 @@ def answer(folder: Path, *options: str) -> dict[str, Any]:
     return found
 
 
+@pytest.mark.validation
 def test_the_ranking_blames_an_excitation_and_does_without_it(tmp_path, monkeypatch):
     """Twelve torques per revolution pass 125 Hz at 627 rpm, the mesh with 20 teeth at 376 rpm."""
     monkeypatch.chdir(tmp_path)
@@ -356,6 +357,7 @@ def test_a_continuation_follows_states_under_an_excitation(tmp_path, monkeypatch
     np.testing.assert_allclose(*amplitudes, rtol=1e-5, atol=1e-6 * amplitudes[1].max())
 
 
+@pytest.mark.validation
 def test_the_summary_lists_speeds_at_which_loads_do_not_settle(tmp_path, monkeypatch):
     """Order 1 with a fifth of the torque turns the free pair too far near standstill, and not above 300 rpm."""
     monkeypatch.chdir(tmp_path)

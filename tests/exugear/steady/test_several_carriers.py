@@ -111,6 +111,7 @@ def test_a_run_of_two_planets_behind_a_flexible_ring_gear_stays_on_its_steady_st
     assert apart_over_time(solver, SPEED, 1.4, 1.0 / 120e3, 0.6) < 3e-3
 
 
+@pytest.mark.validation
 def test_two_halves_of_a_ring_gear_are_the_whole(grc, stiffness, tmp_path):
     """A ring gear whose teeth are two meshes of half of the stiffness, as those of a herringbone gear."""
     content = ring_content(grc, tmp_path)

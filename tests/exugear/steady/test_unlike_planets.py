@@ -62,6 +62,7 @@ def lines_by_order(solver, speed):
     return {tuple(index): line for index, line in zip(solver.model.lines.index.tolist(), lines, strict=True)}
 
 
+@pytest.mark.validation
 def test_equal_planets_taken_one_by_one_give_the_response_of_their_waves(monkeypatch):
     """Three equal planets on bearings that are stiffer along y: the response in multi-blade coordinates is another way.
 
@@ -164,6 +165,7 @@ def test_both_ends_of_the_range_of_damping_are_those_of_other_dampers():
         assert np.linalg.norm(found - known) < 1e-4 * np.linalg.norm(known)
 
 
+@pytest.mark.validation
 def test_slow_planets_share_the_load_as_in_the_static_state():
     """Unevenly spaced planets on bearings that are equal in all directions: the state stands still on the carrier.
 
@@ -183,6 +185,7 @@ def test_slow_planets_share_the_load_as_in_the_static_state():
         assert expected.max() / expected.mean() > 1.02
 
 
+@pytest.mark.validation
 def test_a_stored_response_says_what_varies_and_how_planets_share_the_load():
     assembly = train(on_unlike_bearings(gear_trains.unevenly_spaced()))
     data = to_dataset(response_of(assembly, SteadySettings(SpeedRange(40.0, 60.0, 2), harmonics=1)))

@@ -98,6 +98,7 @@ def test_a_third_step_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.undo()
 
 
+@pytest.mark.validation
 def test_the_moment_of_each_mesh_is_that_of_its_contact_alone() -> None:
     """Force and moment at the static state, against contact solved at the very force and misalignment of the mesh."""
     state = solved("grc")

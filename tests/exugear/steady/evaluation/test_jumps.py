@@ -93,6 +93,7 @@ def test_jumps_are_in_the_stored_comparison(
     assert [peak["contact_loss"] for peak in peaks] == [peak.contact_loss for peak in comparison.peaks]
 
 
+@pytest.mark.validation
 def test_a_mesh_model_with_contact_loss_is_judged_by_the_fraction_of_the_time(
     tmp_path: Path,
 ) -> None:

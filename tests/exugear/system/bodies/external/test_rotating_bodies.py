@@ -236,6 +236,7 @@ def test_a_ring_from_matrices_has_sectors(tmp_path: Path, grc: Gearbox, stiffnes
     assert not unsuitable(bushing, ("housing",))
 
 
+@pytest.mark.validation
 def test_a_ring_written_and_read_back_is_the_same_with_its_planets(
     tmp_path: Path, grc: Gearbox, stiffness: dict[str, np.ndarray]
 ) -> None:
