@@ -135,8 +135,8 @@ def each_in_forks(function: Callable[[Item], Result], items: Iterable[Item]) -> 
         at_once = max(1, min(int(_SENT_AT_ONCE / took), len(waiting) // (4 * count)))
         # The system may end a fork for its memory, or have no process or semaphore left: items without a result wait.
         with suppress(BrokenExecutor, OSError, NotImplementedError), _Forks(count, function) as forks:
-            items = list(waiting)
-            futures = deque(forks.submit_all([items[n : n + at_once] for n in range(0, len(items), at_once)]))
+            left = list(waiting)
+            futures = deque(forks.submit_all([left[n : n + at_once] for n in range(0, len(left), at_once)]))
             while futures:
                 for found in futures.popleft().result():
                     waiting.popleft()
