@@ -40,8 +40,12 @@ LEAST_SHARE = 1e-3
 """Peaks below this share of the largest of their signal, in the range of operation too, are left to the even steps."""
 MOST = 240
 """Crossings at most, the strongest first."""
-LOUDEST = 100
-"""Peaks of each quantity whose tops are looked for, of all speeds and of the range of operation."""
+PREDICTED = 200
+"""Highest peaks of each quantity at the known speeds whose tops are predicted, of all speeds and of the range of
+operation."""
+LOUDEST = 30
+"""Number of these whose tops are predicted to be highest, and at whose tops the response is evaluated. Peaks below may
+be known between two even steps only."""
 LEAST_STAND = 1e-4
 """Relative prominence of a peak at the known speeds from which it is refined: its maximum may be higher."""
 GAIN = 1e-3
@@ -183,7 +187,7 @@ def missed_tops(
     operation: tuple[float, float] | None,
     known: KnownTops | None = None,
 ) -> Floats:
-    """Return speeds at which the highest peaks exceed every known speed, by curves through five neighbours.
+    """Return speeds at which the peaks of the highest tops exceed every known speed, by curves through neighbours.
 
     Parameters
     ----------
@@ -205,11 +209,10 @@ def missed_tops(
         argmax = sizes.argmax(axis=2)
         highest = np.take_along_axis(sizes, argmax[..., None], axis=2)[..., 0]
         peaks = sorted(peaks_of_lines(highest, LEAST_STAND), key=lambda peak: -highest[peak])
-        loudest = dict.fromkeys(peaks[:LOUDEST]) | dict.fromkeys([peak for peak in peaks if inside[peak[0]]][:LOUDEST])
         keys: dict[tuple[int, int], tuple[str, int, int, int, bytes]] = {}
         # Curves at one place whose peaks have as many neighbours on either side are evaluated together.
         alike: dict[tuple[int, int, int], list[tuple[int, int]]] = {}
-        for point, line in loudest:
+        for point, line in _first(peaks, PREDICTED, inside):
             around = _around(point, len(speeds))
             if smooth[around].all():
                 place = int(argmax[point, line])
@@ -224,14 +227,21 @@ def missed_tops(
             values = quantity.components(amplitude[at, lines[:, None] + 1], place)
             predicted = predicted_tops(speeds[at], values, before, partial(quantity.size, place=place))
             known |= zip([keys[peak] for peak in found], np.transpose(predicted).tolist(), strict=True)
-        for (point, line), key in keys.items():
-            top, height = known[key]
+        by_height = sorted(keys, key=lambda peak: -known[keys[peak]][1])
+        for point, line in _first(by_height, LOUDEST, inside):
+            top, height = known[keys[point, line]]
             near = APART * (speeds[point + 1] - speeds[point - 1])
             new = all(abs(top - other) > near for other in tops)
             new &= bool((np.abs(speeds[_around(point, len(speeds))] - top) > COINCIDE * abs(top)).all())
             if new and height > (1.0 + GAIN) * highest[point, line]:
                 tops.append(top)
     return np.sort(np.array(tops))
+
+
+def _first(peaks: list[tuple[int, int]], count: int, inside: Booleans) -> list[tuple[int, int]]:
+    """Return so many of the first peaks (point, line), and as many of those whose points are `inside`."""
+    operating = [peak for peak in peaks if inside[peak[0]]]
+    return list(dict.fromkeys(peaks[:count] + operating[:count]))
 
 
 def missed_flanks(

@@ -80,6 +80,7 @@ def damping_band(model: HarmonicBalanceModel, method: Method, speed: Floats, amp
     found = np.zeros((len(point), len(quantities), 2))
     respond = {"linear": linear_response, "parametric": parametric_response}[method]
     ends = damping_limits(model.system)
+    whole = [model.with_system(system) for system in ends]
 
     def limits_at(at: int) -> Floats:
         """Amplitudes (peaks, s, 2) of the peaks at one point."""
@@ -97,7 +98,7 @@ def damping_band(model: HarmonicBalanceModel, method: Method, speed: Floats, amp
 
         limits = np.zeros((len(own), len(quantities), 2))
         for end, system in enumerate(ends):
-            damped = few.with_system(system)
+            damped = whole[end] if few is model else few.with_system(system)
             before, middle, after = (sizes(damped, beside) for beside in (-BESIDE, 0.0, BESIDE))
             # A quantity without a peak there counts at the peak's speed: beside it others may rise.
             limits[..., end] = np.where(rises[point == at], resonance_top(before, middle, after), middle)

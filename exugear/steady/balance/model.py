@@ -133,6 +133,7 @@ class HarmonicBalanceModel:
             name: np.array([getattr(row, name) for row in rows]) for name in ("by_place", "by_rate", "by_acceleration")
         }
         self._row_names = rows[0].names
+        self.gear_load_rows = gear_load_rows(waves)
         self.signal_names: tuple[SignalName, ...] = (*self._row_names, *mesh_signal_names(waves))
         if self.radiated is not None:
             self.signal_names += (SURFACE_VELOCITY,)
@@ -230,11 +231,6 @@ class HarmonicBalanceModel:
     def reacting_excitations(self) -> tuple[str, ...]:
         """Excitations with reactions on fixed bodies; r of them."""
         return reacting_excitations(self.waves.assembly.gearbox)
-
-    @cached_property
-    def gear_load_rows(self) -> tuple[Floats, Floats, Floats]:
-        """Loads of the gears that stand still per unit of what acts on each wave, as `gear_load_rows` has them."""
-        return gear_load_rows(self.waves)
 
     @cached_property
     def _misalignments(self) -> Floats:
