@@ -43,9 +43,9 @@ MOST = 240
 PREDICTED = 200
 """Highest peaks of each quantity at the known speeds whose tops are predicted, of all speeds and of the range of
 operation."""
-LOUDEST = 30
-"""Number of these whose tops are predicted to be highest, and at whose tops the response is evaluated. Peaks below may
-be known between two even steps only."""
+LOUDEST, LOUDEST_BESIDE_OTHERS = 60, 30
+"""Number of these at whose tops the response is evaluated, those predicted to be highest; the second where stiffness
+varies with the carrier and a speed takes a hundred times as long. Lower peaks may be known at even steps only."""
 LEAST_STAND = 1e-4
 """Relative prominence of a peak at the known speeds from which it is refined: its maximum may be higher."""
 GAIN = 1e-3
@@ -186,6 +186,7 @@ def missed_tops(
     quantities: Sequence[Quantity],
     operation: tuple[float, float] | None,
     known: KnownTops | None = None,
+    count: int = LOUDEST,
 ) -> Floats:
     """Return speeds at which the peaks of the highest tops exceed every known speed, by curves through neighbours.
 
@@ -198,6 +199,7 @@ def missed_tops(
     operation : operating speed range, whose highest peaks are ranked separately, rad/s without sign
     known : dict, optional
         Maxima found between the same speeds before; newly found ones are added.
+    count : number of tops of each quantity that are evaluated, of all speeds and of the range of operation
     """
     if len(speeds) < NEIGHBOURS:
         return np.zeros(0)
@@ -221,14 +223,14 @@ def missed_tops(
                     alike.setdefault((place, point - around.start, around.stop - around.start), []).append(
                         (point, line)
                     )
-        for (place, before, count), found in alike.items():
+        for (place, before, around_it), found in alike.items():
             points, lines = np.array(found).T
-            at = points[:, None] - before + np.arange(count)
+            at = points[:, None] - before + np.arange(around_it)
             values = quantity.components(amplitude[at, lines[:, None] + 1], place)
             predicted = predicted_tops(speeds[at], values, before, partial(quantity.size, place=place))
             known |= zip([keys[peak] for peak in found], np.transpose(predicted).tolist(), strict=True)
         by_height = sorted(keys, key=lambda peak: -known[keys[peak]][1])
-        for point, line in _first(by_height, LOUDEST, inside):
+        for point, line in _first(by_height, count, inside):
             top, height = known[keys[point, line]]
             near = APART * (speeds[point + 1] - speeds[point - 1])
             new = all(abs(top - other) > near for other in tops)

@@ -25,6 +25,8 @@ from exugear.steady.balance.stability import growth_of_state
 from exugear.steady.campbell import Campbell, ModeTracks, campbell_of, modes_over_speed
 from exugear.steady.crossings import (
     HARMONICS,
+    LOUDEST,
+    LOUDEST_BESIDE_OTHERS,
     Contributions,
     Crossing,
     KnownTops,
@@ -456,7 +458,8 @@ def _with_tops(
     """
     tops: KnownTops = {}
     quantities = solver.model.quantities
-    for missed in (partial(missed_tops, known=tops), missed_flanks):
+    loudest = LOUDEST_BESIDE_OTHERS if solver.model.waves.neighbours else LOUDEST
+    for missed in (partial(missed_tops, known=tops, count=loudest), missed_flanks):
         for _ in range(ROUNDS):
             is_solved = np.flatnonzero(np.isfinite(points.drive_torque))
             order = is_solved[np.argsort(points.speed[is_solved], kind="stable")]
