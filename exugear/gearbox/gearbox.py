@@ -350,7 +350,7 @@ class Gearbox(ReprMixin):
         GearboxFileError
             No such body or inertia set exists.
         """
-        bodies = {body.name: body for body in self.bodies(inertias)}
+        bodies = {body.name: body for body in self.bodies(inertias)} if inertias else self.named_bodies
         if name not in bodies:
             raise self.error(f"no body {name!r}; bodies are {', '.join(bodies)}")
         return bodies[name]

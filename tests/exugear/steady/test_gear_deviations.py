@@ -157,6 +157,7 @@ def test_teeth_that_part_once_in_a_revolution_have_the_amplitudes_of_a_run(torqu
     assert np.linalg.norm(abs(lines) - abs(known)) < 1e-3 * np.linalg.norm(known)
 
 
+@pytest.mark.validation
 def test_a_run_that_looks_for_a_state_has_the_deviations():
     """Started without vibration it settles to the eccentricity."""
     _, solver = loose_pair(deviations={"one": {"body": "shaft_1", "runout_um": 20.0}})

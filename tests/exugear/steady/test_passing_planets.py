@@ -140,6 +140,7 @@ def lines_of(grc, stiffness, folder, name, stiffer):
     return {quantity: by_order(solver.model, lines[:, names.index(quantity)]) for quantity in ("overall_dte", force)}
 
 
+@pytest.mark.validation
 def test_a_computation_can_be_stopped_while_the_orders_beside_others_are_chosen(grc, stiffness, tmp_path):
     """Every step of the preparation is reported; an exception at one of them, as of Ctrl-C, ends the computation."""
     assembly = assembled(stage(grc, tmp_path, "four out of phase"), Choice("flexible"), stiffness)

@@ -62,7 +62,7 @@ def test_small_vibration_is_that_of_linear_bearings(gearbox):
 
 
 @pytest.mark.sample
-@pytest.mark.parametrize("speed", [60.0, 150.0])
+@pytest.mark.parametrize("speed", [pytest.param(60.0, marks=pytest.mark.validation), 150.0])
 def test_a_spur_pair_on_rollers_and_balls_stays_on_its_steady_state(speed):
     """RK4 at 1/60 kHz; harmonics beyond the tenth and the parabola of the position leave 1e-4."""
     assert apart(spur_solver(PLAIN, (20.0, 400.0)), speed, 0.4, 1.0 / 60e3, 0.2)[0] < 3e-4

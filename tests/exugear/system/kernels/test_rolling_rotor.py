@@ -131,7 +131,7 @@ def test_undamped_rotor_keeps_its_energy_over_a_second(cage_ratio: float) -> Non
         assert abs(states[-1, 11] - 80.0) * 80.0 * AXIAL_INERTIA > 1e-3 * vibration
 
 
-@pytest.mark.parametrize("row", [CYLINDRICAL, BALLS])
+@pytest.mark.parametrize("row", [pytest.param(CYLINDRICAL, marks=pytest.mark.validation), BALLS])
 def test_small_vibration_has_the_eigenfrequencies_of_the_tangent(row: RollingRow) -> None:
     pull = PULL if row is CYLINDRICAL else 0.2 * PULL
     case = rotor(row)
