@@ -60,12 +60,12 @@ def knots_of(low: float, high: float, within: tuple[float, float] | None, column
     return [low, high], [0, columns]
 
 
-def pooled(level: Floats, speed: Floats, knots: Knots, lines: int) -> Floats:
-    """Return the highest level in cells of a range of speeds and several spectral lines; peaks widen to their cell.
+def pooled(amplitude: Floats, speed: Floats, knots: Knots, lines: int) -> Floats:
+    """Return the highest amplitude in cells of a range of speeds and several spectral lines; peaks widen to their cell.
 
     Parameters
     ----------
-    level : (n, m) dB
+    amplitude : (n, m)
     speed : (n,) rad/s
     knots : columns of cells over the speed
     lines : spectral lines per cell; an incomplete cell at the top is dropped
@@ -74,10 +74,10 @@ def pooled(level: Floats, speed: Floats, knots: Knots, lines: int) -> Floats:
     -------
     (columns, m // lines); cells without a frame take the nearest frame
     """
-    count = level.shape[1] // lines * lines
-    narrow = level[:, :count:lines].copy()
+    count = amplitude.shape[1] // lines * lines
+    narrow = amplitude[:, :count:lines].copy()
     for line in range(1, lines):
-        np.maximum(narrow, level[:, line:count:lines], out=narrow)
+        np.maximum(narrow, amplitude[:, line:count:lines], out=narrow)
     columns = knots[1][-1]
     cell = np.minimum(np.interp(speed, *knots).astype(np.int64), columns - 1)
     whole = np.full((columns, narrow.shape[1]), -np.inf)
@@ -230,9 +230,10 @@ def _levels(
         count = max(4, int(np.searchsorted(spectra.frequency, min(top, float(spectra.frequency[-1])))))
     around = group.rankings[variant].around
     knots = knots_of(float(spectra.speed.min()), float(spectra.speed.max()), around, columns)
-    floor = 10.0 * math.floor((float(spectra.level[:, 2:count].max()) - SPAN) / 10.0)
+    floor = 10.0 * math.floor((float(spectra.level_of(spectra.amplitude[:, 2:count].max())) - SPAN) / 10.0)
     spacing = float(spectra.frequency[1])
-    cells = level_bytes(pooled(spectra.level[:, :count], spectra.speed, knots, lines), floor, step)
+    highest = spectra.level_of(pooled(spectra.amplitude[:, :count], spectra.speed, knots, lines))
+    cells = level_bytes(highest, floor, step)
     along = np.array([spectra.along(line) for line in material.lines])
     cuts = tenths(along.reshape(len(material.lines), spectra.time.size).T)
     return {

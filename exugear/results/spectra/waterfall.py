@@ -168,7 +168,11 @@ class Waterfall(ReprMixin, line=": {time.size} spectra of {frequency.size} lines
     @cached_property
     def level(self) -> Floats:
         """Level in dB, shape (n, m); the lower limit is 200 dB below the reference."""
-        return 20.0 * np.log10(np.maximum(self.amplitude / self.reference, 1e-10))
+        return self.level_of(self.amplitude)
+
+    def level_of(self, amplitude: Floats) -> Floats:
+        """Level of some amplitudes, dB: of a few it takes less time than the level of all."""
+        return 20.0 * np.log10(np.maximum(amplitude / self.reference, 1e-10))
 
     @cached_property
     def _along(self) -> dict[OrderLine, Floats]:
@@ -298,7 +302,7 @@ def line_level(spectra: Waterfall, line: OrderLine) -> Floats:
     last = spectra.frequency.size - 1
     # The nearest spectral line is always included; half a resolution is at least that.
     near = np.abs(index * spacing - frequency[:, None]) <= np.maximum(0.5 * resolution, 0.5 * spacing)[:, None]
-    level = np.take_along_axis(spectra.level, np.clip(index, 0, last), axis=1)
-    highest: Floats = np.where(near, level, -np.inf).max(axis=1)
+    amplitude = np.take_along_axis(spectra.amplitude, np.clip(index, 0, last), axis=1)
+    highest: Floats = spectra.level_of(np.where(near, amplitude, 0.0).max(axis=1))
     inside = (frequency > 4.0 / spectra.window_length) & (nearest <= last)
     return np.where(inside, highest, np.nan)
