@@ -46,6 +46,7 @@ from .plain_motion import elastic_energies, kinetic_energies
 
 def sampled(assembly: Assembly, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Signals of states q, v (samples, size), shape (samples, columns)."""
+    q, v = np.ascontiguousarray(q), np.ascontiguousarray(v)  # others would have the loops compiled once more
     layout = signal_layout(assembly)
     meshes = len(assembly.mesh_names)
     out = np.empty((q.shape[0], layout.count))
@@ -78,6 +79,7 @@ def sampled(assembly: Assembly, q: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 def energies_of(assembly: Assembly, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Kinetic and elastic energy (J), powers (W) but the loads' of states q, v (samples, size), (samples, 7)."""
+    q, v = np.ascontiguousarray(q), np.ascontiguousarray(v)
     a, out = assembly, np.empty((q.shape[0], 7))
     energy_signals(*a.with_travelling(q, v), a.meshes, a.connectors, a.springs, a.inertia, out)
     add_elastic_signals(q, v, a.elastic, scratch_for(a.elastic), out)

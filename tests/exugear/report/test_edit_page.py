@@ -215,7 +215,7 @@ def test_a_mode_is_chosen_in_the_table_and_in_the_diagram(view: EditView) -> Non
     assert view.errors == []
 
 
-@pytest.mark.parametrize("name", ["Tables", "Design changes"])
+@pytest.mark.parametrize("name", ["Tables", pytest.param("Design changes", marks=pytest.mark.long)])
 def test_long_work_shows_progress_and_is_cancelled(browser: Any, address: str, case: Path, name: str) -> None:
     case.write_text(f"{PAIR}\n[ste]\npositions = 1000\n", encoding="utf-8")  # half a minute on a fast machine
     view = EditView(browser, address)
