@@ -43,7 +43,7 @@ MOST = 240
 PREDICTED = 200
 """Highest peaks of each quantity at the known speeds whose tops are predicted, of all speeds and of the range of
 operation."""
-LOUDEST, LOUDEST_BESIDE_OTHERS = 60, 30
+LOUDEST, LOUDEST_BESIDE_OTHERS = 100, 30
 """Number of these at whose tops the response is evaluated, those predicted to be highest; the second where stiffness
 varies with the carrier and a speed takes a hundred times as long. Lower peaks may be known at even steps only."""
 LEAST_STAND = 1e-4
