@@ -19,6 +19,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.units import RPM
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin, TitledRows, value_range
+from fe_ste.tools.threads import available_cores, second_core_is_free
 
 # Order lines: excitations with a constant number of periods per revolution of the reference shaft
 
@@ -91,7 +92,9 @@ def amplitude_spectrum(values: ArrayLike, rate: float, window: str = "hann", pad
     count = padding * signal.shape[-1]
     weights = scipy.signal.get_window(window, signal.shape[-1])  # periodic, so that a tone at a bin is exact
     scaled = (2.0 / weights.sum() * weights).astype(kind)
-    amplitude: Floats = np.abs(scipy.fft.rfft(signal * scaled, n=count, axis=-1))
+    # Each frame is transformed by itself: the same numbers with any number of threads.
+    threads = available_cores() if second_core_is_free() else 1
+    amplitude: Floats = np.abs(scipy.fft.rfft(signal * scaled, n=count, axis=-1, workers=threads))
     amplitude[..., 0] *= 0.5
     if count % 2 == 0:
         amplitude[..., -1] *= 0.5
