@@ -10,7 +10,6 @@ With `--hour` these are the commands of a user's first hour, and the page gets a
 from __future__ import annotations
 
 import argparse
-import importlib.util
 import os
 import re
 import shutil
@@ -18,7 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 VERSIONS = ("3.11", "3.12", "3.13")
@@ -78,7 +77,7 @@ def try_wheel(python: str, wheel: Path, constraint: Path | None) -> None:
     """
     with tempfile.TemporaryDirectory() as scratch:
         home = Path(scratch)
-        own = installed(home, python, wheel, constraint, installer=_uv)
+        own = installed(home, python, wheel, constraint)
         exugear = own / "exugear"
         where = run(home, own / "python", "-c", "import exugear, fe_ste; print(exugear.__file__, fe_ste.__file__)")
         assert all(Path(path).is_relative_to(home.resolve()) for path in where.split()), where
@@ -96,32 +95,13 @@ def try_wheel(python: str, wheel: Path, constraint: Path | None) -> None:
         run(home, exugear, "check", home / "env" / GRC)
 
 
-def _pip(python: Path) -> tuple[str | Path, ...]:
-    """Command of pip that installs for an interpreter."""
-    return python, "-m", "pip", "install", "-q", "--disable-pip-version-check"
-
-
-def _uv(python: Path) -> tuple[str | Path, ...]:
-    """Command of uv that does the same in a fraction of the time; of pip where uv is not installed."""
-    if importlib.util.find_spec("uv") is None:
-        return _pip(python)
-    return sys.executable, "-m", "uv", "pip", "install", "-q", "--python", python
-
-
-def installed(
-    home: Path,
-    python: str,
-    wheel: Path,
-    constraint: Path | None,
-    extras: str = "",
-    installer: Callable[[Path], tuple[str | Path, ...]] = _pip,
-) -> Path:
+def installed(home: Path, python: str, wheel: Path, constraint: Path | None, extras: str = "") -> Path:
     """Install a wheel, with extras such as ``[all]``, into a fresh environment; return the folder of its programs."""
     run(home, python, "-m", "venv", "env")
     own = home / "env" / ("Scripts" if os.name == "nt" else "bin")
     limits = ["--constraint", str(constraint.resolve())] if constraint else []
     what = f"{wheel.resolve()}{extras}"
-    run(home, *installer(own / "python"), *limits, what)
+    run(home, own / "python", "-m", "pip", "install", "-q", "--disable-pip-version-check", *limits, what)
     return own
 
 

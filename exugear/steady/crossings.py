@@ -223,9 +223,9 @@ def missed_tops(
                     alike.setdefault((place, point - around.start, around.stop - around.start), []).append(
                         (point, line)
                     )
-        for (place, before, around_it), found in alike.items():
+        for (place, before, points_around), found in alike.items():
             points, lines = np.array(found).T
-            at = points[:, None] - before + np.arange(around_it)
+            at = points[:, None] - before + np.arange(points_around)
             values = quantity.components(amplitude[at, lines[:, None] + 1], place)
             predicted = predicted_tops(speeds[at], values, before, partial(quantity.size, place=place))
             known |= zip([keys[peak] for peak in found], np.transpose(predicted).tolist(), strict=True)
