@@ -11,10 +11,8 @@ negative.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 import scipy.linalg
@@ -24,39 +22,18 @@ from exugear.steady.balance.interface import Interface
 from exugear.steady.balance.model import HarmonicBalanceModel
 from exugear.steady.balance.response import mean_deviation_forces, transmission_errors
 from exugear.steady.campbell import ModeTracks
-from exugear.steady.harmonics.branches import NEIGHBOURS, peaks_of_lines, predicted_tops
 from exugear.steady.mean_system.mean_system import MeanSystem, mean_modes
 from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT
-from exugear.steady.mean_system.signals import Quantity
-from fe_ste.tools.arrays import Booleans, Complexes, Floats, SingleComplexes
+from fe_ste.tools.arrays import Booleans, Complexes, Floats
 from fe_ste.tools.threads import side_by_side
 
 Forcing = Callable[[Interface], Complexes]
-KnownTops = dict[tuple[str, int, int, int, bytes], list[float]]
-"""Place and height of tops by quantity, line, place of the quantity, and the speeds around."""
 HARMONICS = 3
 """Multiples of the fastest mesh frequency up to which modes are followed."""
 LEAST_SHARE = 1e-3
 """Peaks below this share of the largest of their signal, in the range of operation too, are left to the even steps."""
 MOST = 240
 """Crossings at most, the strongest first."""
-PREDICTED = 200
-"""Highest peaks of each quantity at the known speeds whose tops are predicted, of all speeds and of the range of
-operation."""
-LOUDEST, LOUDEST_BESIDE_OTHERS = 100, 30
-"""Number of these at whose tops the response is evaluated, those predicted to be highest; the second where stiffness
-varies with the carrier and a speed takes a hundred times as long. Lower peaks may be known at even steps only."""
-LEAST_STAND = 1e-4
-"""Relative prominence of a peak at the known speeds from which it is refined: its maximum may be higher."""
-GAIN = 1e-3
-"""Relative excess of a maximum over its peak at the known speeds from which it is evaluated."""
-APART = 0.25
-"""Share of the distance between a peak's neighbours within which two maxima are evaluated together."""
-DRAWN = 10
-"""Highest peaks of each quantity in the range of operation whose flanks are resolved for drawings."""
-FLANK = (0.6, 1.2)
-"""Places of two points on a flank, over the distance at which a resonance falls to 1 / sqrt(2) of its top: they are at
-86 % and 64 % of it."""
 ROUNDS = 4
 """Iterations to a mode at the speed where a line meets it; their error is squared each time."""
 COINCIDE = 1e-6
@@ -177,136 +154,6 @@ def with_crossings(speeds: Floats, found: tuple[Crossing, ...]) -> Floats:
     inside = [crossing.speed for crossing in found if speeds.min() <= crossing.speed <= speeds.max()]
     both = np.sort(np.concatenate([speeds, inside]))
     return np.asarray(both[np.append(True, np.diff(both) > COINCIDE * np.abs(both[1:]))])
-
-
-def missed_tops(
-    speeds: Floats,
-    amplitude: SingleComplexes,
-    smooth: Booleans,
-    quantities: Sequence[Quantity],
-    operation: tuple[float, float] | None,
-    known: KnownTops | None = None,
-    count: int = LOUDEST,
-) -> Floats:
-    """Return speeds at which the peaks of the highest tops exceed every known speed, by curves through neighbours.
-
-    Parameters
-    ----------
-    speeds : (n,) ascending, rad/s
-    amplitude : (n, lines, signals) of all signals, the mean as the first line
-    smooth : (n,) where the response is smooth over speed: not with contact loss
-    quantities : quantities whose peaks are evaluated
-    operation : operating speed range, whose highest peaks are ranked separately, rad/s without sign
-    known : dict, optional
-        Maxima found between the same speeds before; newly found ones are added.
-    count : number of tops of each quantity that are evaluated, of all speeds and of the range of operation
-    """
-    if len(speeds) < NEIGHBOURS:
-        return np.zeros(0)
-    known = {} if known is None else known
-    tops: list[float] = []
-    inside = in_operation(speeds, operation)
-    for quantity in quantities:
-        sizes = quantity.sizes(amplitude[:, 1:])
-        argmax = sizes.argmax(axis=2)
-        highest = np.take_along_axis(sizes, argmax[..., None], axis=2)[..., 0]
-        peaks = sorted(peaks_of_lines(highest, LEAST_STAND), key=lambda peak: -highest[peak])
-        keys: dict[tuple[int, int], tuple[str, int, int, int, bytes]] = {}
-        # Curves at one place whose peaks have as many neighbours on either side are evaluated together.
-        alike: dict[tuple[int, int, int], list[tuple[int, int]]] = {}
-        for point, line in _first(peaks, PREDICTED, inside):
-            around = _around(point, len(speeds))
-            if smooth[around].all():
-                place = int(argmax[point, line])
-                keys[point, line] = quantity.name, line, place, point - around.start, speeds[around].tobytes()
-                if keys[point, line] not in known:
-                    alike.setdefault((place, point - around.start, around.stop - around.start), []).append(
-                        (point, line)
-                    )
-        for (place, before, points_around), found in alike.items():
-            points, lines = np.array(found).T
-            at = points[:, None] - before + np.arange(points_around)
-            values = quantity.components(amplitude[at, lines[:, None] + 1], place)
-            predicted = predicted_tops(speeds[at], values, before, partial(quantity.size, place=place))
-            known |= zip([keys[peak] for peak in found], np.transpose(predicted).tolist(), strict=True)
-        by_height = sorted(keys, key=lambda peak: -known[keys[peak]][1])
-        for point, line in _first(by_height, count, inside):
-            top, height = known[keys[point, line]]
-            near = APART * (speeds[point + 1] - speeds[point - 1])
-            new = all(abs(top - other) > near for other in tops)
-            new &= bool((np.abs(speeds[_around(point, len(speeds))] - top) > COINCIDE * abs(top)).all())
-            if new and height > (1.0 + GAIN) * highest[point, line]:
-                tops.append(top)
-    return np.sort(np.array(tops))
-
-
-def _first(peaks: list[tuple[int, int]], count: int, inside: Booleans) -> list[tuple[int, int]]:
-    """Return so many of the first peaks (point, line), and as many of those whose points are `inside`."""
-    operating = [peak for peak in peaks if inside[peak[0]]]
-    return list(dict.fromkeys(peaks[:count] + operating[:count]))
-
-
-def missed_flanks(
-    speeds: Floats,
-    amplitude: SingleComplexes,
-    smooth: Booleans,
-    quantities: Sequence[Quantity],
-    operation: tuple[float, float] | None,
-) -> Floats:
-    """Return speeds beside the highest peaks that are drawn as triangles: with fewer than two points above half height.
-
-    Parameters are those of `missed_tops`.
-
-    Notes
-    -----
-    Near the top A of a resonance the amplitude at a distance d is A / sqrt(1 + (d / w)^2). The first point below A / 2
-    on a flank gives w. Other modes may add to that point, and w is too large; the next call then comes closer.
-    """
-    inside = in_operation(speeds, operation)
-    more: list[float] = []
-    for quantity in quantities:
-        sizes = quantity.sizes(amplitude[:, 1:]).max(axis=2)
-        peaks = [peak for peak in peaks_of_lines(sizes) if inside[peak[0]]]
-        for point, line in sorted(peaks, key=lambda peak: -sizes[peak])[:DRAWN]:
-            if smooth[_around(point, len(speeds))].all():
-                for side in (slice(point, None), slice(point, None, -1)):
-                    more += _on_flank(speeds[side], sizes[side, line])
-    taken = list(speeds)
-    for speed in sorted(more):
-        if np.abs(np.array(taken) - speed).min() > COINCIDE * abs(speed):
-            taken.append(speed)
-    return np.array(taken[len(speeds) :])
-
-
-def _on_flank(speeds: Floats, amplitude: Floats) -> list[float]:
-    """Return the speeds that a flank lacks; it begins at its peak.
-
-    Examples
-    --------
-    A peak of 1 that falls to 1 / sqrt(2) at 100.1; the flank has no point above half height, and then one:
-
-    >>> def resonance(speeds):
-    ...     return 1.0 / np.hypot(1.0, (speeds - 100.0) / 0.1)
-    >>> coarse, better = np.array([100.0, 101.0, 102.0]), np.array([100.0, 100.06, 101.0])
-    >>> np.round(_on_flank(coarse, resonance(coarse)), 3).tolist()
-    [100.06, 100.12]
-    >>> np.round(_on_flank(better, resonance(better)), 3).tolist()
-    [100.12]
-    """
-    below = np.flatnonzero(amplitude < 0.5 * amplitude[0])
-    if not below.size or below[0] > len(FLANK) or amplitude[below[0]] <= 0.0:
-        return []
-    first = int(below[0])
-    width = (speeds[first] - speeds[0]) / math.sqrt((amplitude[0] / amplitude[first]) ** 2 - 1.0)
-    wanted = [float(speeds[0] + share * width) for share in FLANK]
-    # Of two points, the one that is further from a known one is new.
-    known = speeds[1:first]
-    return sorted(wanted, key=lambda own: -float(np.abs(known - own).min(initial=np.inf)))[: len(FLANK) - len(known)]
-
-
-def _around(point: int, count: int) -> slice:
-    """Return the places of a point and its neighbours, among so many."""
-    return slice(max(point - NEIGHBOURS, 0), min(point + NEIGHBOURS + 1, count))
 
 
 def _passages(tracks: ModeTracks, orders: Floats) -> list[tuple[int, int, float]]:

@@ -39,6 +39,15 @@ NOTICED_NEIGHBOURS = 1e-2
 """Relative change of the vibration by orders that are left out above which a warning is given."""
 NOTICED_SHUTTLING = 0.3
 """Ratio of shuttling moment to transmission error excitation above which a warning is given."""
+FIRST_RANKS = 20
+"""Ranks that are to be true: a warning is given if one of these peaks is higher between the speeds."""
+QUANTITY_NAMES = {
+    "error": "transmission error",
+    "force": "bearing force",
+    "acceleration": "acceleration at bearings",
+    "mount_acceleration": "acceleration at mounts",
+    "surface_velocity": "surface velocity",
+}
 LEAST_AMPLITUDE = 1e-12
 """Amplitude of the overall transmission error below which a response is round-off, m."""
 SHOWN_BEARINGS = 4
@@ -53,7 +62,15 @@ UPPER_ESTIMATE = (
 
 def response_findings(data: xr.Dataset) -> tuple[Finding, ...]:
     """Check a response, as `exugear.steady.steady_file.load_response` reads it."""
-    return (*_balance(data), *_speeds(data), *_models(data), *_passing(data), *_excitation(data), *_sound(data))
+    return (
+        *_balance(data),
+        *_speeds(data),
+        *_between_speeds(data),
+        *_models(data),
+        *_passing(data),
+        *_excitation(data),
+        *_sound(data),
+    )
 
 
 @dataclass(frozen=True)
@@ -152,6 +169,19 @@ def _speeds(data: xr.Dataset) -> Iterator[Finding]:
     if said := [(speed, text) for speed, text in remarks if text]:
         first = f"{_rpm(said[0][0])}: {said[0][1]}"
         yield Finding("warning", f"{len(said)} speeds with warnings, first {first}", len(said))
+
+
+def _between_speeds(data: xr.Dataset) -> Iterator[Finding]:
+    """Peaks of lower rank that are higher between the computed speeds."""
+    if higher := json.loads(str(data.attrs.get("higher_between", "[]"))):
+        parts = [
+            f"{QUANTITY_NAMES[own['quantity']]} from rank {own['rank']} on, by up to {100.0 * own['excess']:.2g} %"
+            for own in higher
+        ]
+        text = "peaks of lower rank are higher between the computed speeds than listed (estimate: "
+        text += f"{'; '.join(parts)}); compute them with a narrower range of --speeds"
+        first = min(own["rank"] for own in higher)
+        yield Finding("warning" if first <= FIRST_RANKS else "note", text, max(own["excess"] for own in higher))
 
 
 def _models(data: xr.Dataset) -> Iterator[Finding]:

@@ -165,6 +165,7 @@ def _attributes(response: SteadyResponse) -> dict[str, Any]:
         "planet_spread": response.planet_spread,
         "varying_carrier": ", ".join(response.varying_carriers),
         "load_sharing": json.dumps(response.load_sharing),
+        "higher_between": json.dumps([asdict(own) for own in response.higher_between]),
         "neighbours_left_out": response.neighbours_left_out,
         "stiffness_variation": response.stiffness_variation,
         "operating_range": json.dumps(operating_range(assembly.gearbox)),

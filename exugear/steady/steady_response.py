@@ -25,16 +25,11 @@ from exugear.steady.balance.stability import growth_of_state
 from exugear.steady.campbell import Campbell, ModeTracks, campbell_of, modes_over_speed
 from exugear.steady.crossings import (
     HARMONICS,
-    LOUDEST,
-    LOUDEST_BESIDE_OTHERS,
     Contributions,
     Crossing,
-    KnownTops,
     contributions,
     crossings,
     loudest_near,
-    missed_flanks,
-    missed_tops,
     with_crossings,
 )
 from exugear.steady.damping_band import DampingBand, damping_band, no_band
@@ -44,7 +39,7 @@ from exugear.steady.harmonics.lines import LineSet
 from exugear.steady.mean_system.mean_system import Steps
 from exugear.steady.mean_system.mesh_places import DEFLECTION
 from exugear.steady.mean_system.planet_sets import SteadyError
-from exugear.steady.mean_system.signals import SURFACE_VELOCITY, SignalName
+from exugear.steady.mean_system.signals import SURFACE_VELOCITY, Quantity, SignalName
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.settings import (
     SteadySettings,
@@ -52,6 +47,15 @@ from exugear.steady.settings import (
     check_nonlinear,
     check_speeds,
     check_varying,
+)
+from exugear.steady.tops import (
+    LOUDEST,
+    LOUDEST_BESIDE_OTHERS,
+    HigherBetween,
+    KnownTops,
+    higher_between,
+    missed_flanks,
+    missed_tops,
 )
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers, SingleComplexes, Texts
@@ -239,6 +243,8 @@ class SteadyResponse(ReprMixin):
     two modes and a mesh frequency, and of the points with contact loss."""
     varying_carriers: tuple[str, ...]
     """Carriers with whose angles stiffness varies: their planets pass a flexible ring gear, or are not alike."""
+    higher_between: tuple[HigherBetween, ...]
+    """By quantity, the peaks that are higher between the computed speeds."""
     neighbours_left_out: float
     """Largest relative change of transmission error and mesh deflections by the orders left out beside others."""
     planet_spread: float
@@ -359,6 +365,7 @@ def response_of(
         found = tuple(replace(one, line=int(model.lines.find(every[one.line])[0])) for one in found)
     folds: tuple[float, ...] = ()
     ended = ""
+    higher: tuple[HigherBetween, ...] = ()
     if settings.branches:
         points, folds, ended = _follow_branch(solver, settings.speeds.first, settings.speeds.last, report)
     else:
@@ -366,7 +373,7 @@ def response_of(
         solve = partial(_solve_from, known=known, progress=report, keep=keep, keep_every=keep_every)
         solve(points, 0, lambda: solver, follows=settings.method == "nonlinear")
         if at_resonances:
-            points = _with_tops(solver, points, operation, solve)
+            points, higher = _with_tops(solver, points, operation, solve)
         points = points.part(np.argsort(points.speed, kind="stable"))
     is_solved = np.isfinite(points.drive_torque)
     if not is_solved.any():
@@ -402,6 +409,7 @@ def response_of(
         branch_ended=ended,
         growth_rate=float(np.fmax.reduce(solved.growth, initial=growth)),
         varying_carriers=model.waves.varying_carriers,
+        higher_between=higher,
         neighbours_left_out=neglected,
         planet_spread=model.system.planet_spread,
         stiffness_variation=model.system.variation,
@@ -450,30 +458,40 @@ def _tracks(model: HarmonicBalanceModel, speeds: Floats) -> ModeTracks:
 
 def _with_tops(
     solver: PointSolver, points: SolvedPoints, operation: tuple[float, float] | None, solve: Callable[..., None]
-) -> SolvedPoints:
+) -> tuple[SolvedPoints, tuple[HigherBetween, ...]]:
     """Solve at speeds where neighbours indicate peaks higher than at any known speed, until none remain.
 
     Then speeds are added on flanks of the highest peaks that have too few for a drawing. Each such state starts
-    independently of others, so that a resumed computation gives the same results.
+    independently of others, so that a resumed computation gives the same results. Peaks that are higher between the
+    speeds after that are returned, too.
     """
     tops: KnownTops = {}
-    quantities = solver.model.quantities
-    loudest = LOUDEST_BESIDE_OTHERS if solver.model.waves.neighbours else LOUDEST
+    model = solver.model
+    loudest = LOUDEST_BESIDE_OTHERS if model.waves.neighbours else LOUDEST
+
+    def smooth_curves() -> tuple[Floats, SingleComplexes, Booleans, tuple[Quantity, ...], tuple[float, float] | None]:
+        """Return what the functions of `exugear.steady.tops` take of the solved points, by ascending speed."""
+        is_solved = np.flatnonzero(np.isfinite(points.drive_torque))
+        order = is_solved[np.argsort(points.speed[is_solved], kind="stable")]
+        smooth = np.asarray(~(points.apart.any(axis=1) | points.free.any(axis=1)))[order]
+        return points.speed[order], points.amplitude[order], smooth, model.quantities, operation
+
     for missed in (partial(missed_tops, known=tops, count=loudest), missed_flanks):
         for _ in range(ROUNDS):
-            is_solved = np.flatnonzero(np.isfinite(points.drive_torque))
-            order = is_solved[np.argsort(points.speed[is_solved], kind="stable")]
-            smooth = np.asarray(~(points.apart.any(axis=1) | points.free.any(axis=1)))[order]
-            more = missed(points.speed[order], points.amplitude[order], smooth, quantities, operation)
+            more = missed(*smooth_curves())
             if not more.size:
                 break
             count = len(points.speed)
-            points = points.joined_with(_empty(solver.model, more))
+            points = points.joined_with(_empty(model, more))
             solve(points, count, lambda: PointSolver(solver.linear, solver.method))
             # A speed that was not requested and has no steady state is dropped without a warning.
             kept = (np.arange(len(points.speed)) < count) | np.isfinite(points.drive_torque)
             points = points if kept.all() else points.part(kept)
-    return points
+    curves = smooth_curves()
+    audible = None
+    if model.radiated is not None:
+        audible = line_frequencies(curves[0], model.lines.orders) <= model.radiated.limit
+    return points, higher_between(*curves, tops, audible)
 
 
 def _solve_from(

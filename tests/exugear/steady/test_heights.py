@@ -11,11 +11,13 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.templates.kinds import template
 from exugear.gearbox.units import RPM
 from exugear.steady.balance.response import signals
+from exugear.steady.findings import response_findings
 from exugear.steady.harmonics.branches import peaks_of_lines, standing_peaks
 from exugear.steady.mean_system.planet_sets import SteadyError
 from exugear.steady.mean_system.signals import quantities_of
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.steady.steady_file import to_dataset
 from exugear.steady.steady_response import response_of
 from exugear.system.build import assemble
 
@@ -133,6 +135,40 @@ def test_the_fifteen_loudest_peaks_of_a_flexible_stage_are_those_of_a_dense_swee
     off = differences(response, dense_peaks(drum, speeds, 4, 400, 15, response.lines))
     for quantity, own in off.items():
         assert own.max() < 2e-3, quantity
+
+
+def heights_of(response, name):
+    """Heights (points, lines) of a quantity of a response."""
+    quantities = quantities_of([own.name for own in response.signals], ())
+    quantity = next(own for own in quantities if own.name == name)
+    return quantity.sizes(response.solved.amplitude[:, 1:]).max(axis=2)
+
+
+def test_peaks_that_are_known_between_speeds_only_are_estimated_and_a_narrower_range_computes_them(
+    parallel, monkeypatch
+):
+    """With three tops instead of a hundred, the estimate is held against the response with all of them."""
+    settings = SteadySettings(SpeedRange(30.0, 60.0, 20), harmonics=4)
+    whole = response_of(parallel, settings)
+    assert not whole.higher_between
+    monkeypatch.setattr("exugear.steady.steady_response.LOUDEST", 3)
+    few = response_of(parallel, settings)
+    sizes, true = heights_of(few, "force"), heights_of(whole, "force")
+    excess = []
+    for point, line in sorted(peaks_of_lines(sizes), key=lambda peak: -sizes[peak]):
+        low, high = few.solved.speed[[point - 1, point + 1]]
+        between = (whole.solved.speed >= low) & (whole.solved.speed <= high)
+        excess.append((true[between, line].max() / sizes[point, line] - 1.0, few.solved.speed[point]))
+    found = {own.quantity: own for own in few.higher_between}
+    most, at = max(excess)
+    assert most > 0.03
+    assert found["force"].excess == pytest.approx(most, rel=0.1)
+    assert all(own < 0.011 for own, _ in excess[: found["force"].rank - 1])
+    finding = next(own for own in response_findings(to_dataset(few)) if "between the computed speeds" in own.text)
+    assert finding.level == "warning"
+    assert f"bearing force from rank {found['force'].rank} on, by up to {100.0 * most:.1f} %" in finding.text
+    narrow = response_of(parallel, SteadySettings(SpeedRange(0.985 * at, 1.015 * at, 20), harmonics=4))
+    assert not narrow.higher_between
 
 
 def fewest_above_half(response):
