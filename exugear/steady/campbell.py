@@ -23,6 +23,7 @@ type.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -75,6 +76,12 @@ class ModeTracks:
     def damping(self) -> Floats:
         """Shares (n, m) of critical damping."""
         return np.asarray(-self.eigenvalues.real / np.abs(self.eigenvalues))
+
+    @property
+    def least_damping(self) -> float:
+        """Lowest share of critical damping of a mode at any speed; 0 without a mode, or where one is not damped."""
+        lowest = float(np.fmin.reduce(self.damping, axis=None, initial=np.inf))
+        return max(lowest, 0.0) if math.isfinite(lowest) else 0.0
 
 
 def assurance(one: Found, other: Found) -> Floats:

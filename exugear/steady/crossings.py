@@ -11,6 +11,7 @@ negative.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -34,6 +35,9 @@ LEAST_SHARE = 1e-3
 """Peaks below this share of the largest of their signal, in the range of operation too, are left to the even steps."""
 MOST = 240
 """Crossings at most, the strongest first."""
+WIDE = 0.5
+"""Half-width of a resonance where its amplitude is 1 / sqrt(2) of the top, in steps between speeds, from which the
+speeds show its top."""
 ROUNDS = 4
 """Iterations to a mode at the speed where a line meets it; their error is squared each time."""
 COINCIDE = 1e-6
@@ -149,9 +153,16 @@ def _shares(peaks: Floats) -> Floats:
     return np.asarray(np.max(peaks / largest, axis=1), dtype=np.float64)
 
 
-def with_crossings(speeds: Floats, found: tuple[Crossing, ...]) -> Floats:
-    """Speeds (n,) and those of crossings between them, ascending; what all but coincides is one."""
-    inside = [crossing.speed for crossing in found if speeds.min() <= crossing.speed <= speeds.max()]
+def with_crossings(speeds: Floats, found: tuple[Crossing, ...], resolved: float = math.inf) -> Floats:
+    """Return speeds (n,) and those of narrow crossings between them, ascending; what all but coincides is one.
+
+    Parameters
+    ----------
+    resolved : half-width of a resonance, in steps between the speeds, from which it is wide and its crossing left out
+    """
+    step = float(np.diff(speeds).max(initial=0.0))
+    narrow = [own.speed for own in found if own.damping * abs(own.speed) < resolved * step]
+    inside = [speed for speed in narrow if speeds.min() <= speed <= speeds.max()]
     both = np.sort(np.concatenate([speeds, inside]))
     return np.asarray(both[np.append(True, np.diff(both) > COINCIDE * np.abs(both[1:]))])
 

@@ -101,14 +101,16 @@ class SpeedCaveats:
 
 
 def _percent(ratio: float) -> str:
-    """Return a ratio of loads in percent; a static load that is next to nothing gives no meaningful number.
+    """Return a ratio in percent; a static load that is next to nothing gives no meaningful number.
 
     Examples
     --------
-    >>> _percent(1.2), _percent(1777.0)
-    ('120 %', 'over 1000 %')
+    >>> _percent(0.0234), _percent(1.2), _percent(1777.0)
+    ('2.3 %', '120 %', 'over 1000 %')
     """
-    return f"{100.0 * ratio:.0f} %" if ratio <= 10.0 else "over 1000 %"
+    if ratio > 10.0:
+        return "over 1000 %"
+    return f"{100.0 * ratio:.0f} %" if ratio > 0.1 else f"{100.0 * ratio:.2g} %"
 
 
 def speed_caveats(data: xr.Dataset) -> SpeedCaveats:
@@ -175,10 +177,10 @@ def _between_speeds(data: xr.Dataset) -> Iterator[Finding]:
     """Peaks of lower rank that are higher between the computed speeds."""
     if higher := json.loads(str(data.attrs.get("higher_between", "[]"))):
         parts = [
-            f"{QUANTITY_NAMES[own['quantity']]} from rank {own['rank']} on, by up to {100.0 * own['excess']:.2g} %"
+            f"{QUANTITY_NAMES[own['quantity']]} from rank {own['rank']} on, by up to {_percent(own['excess'])}"
             for own in higher
         ]
-        text = "peaks of lower rank are higher between the computed speeds than listed (estimate: "
+        text = "peaks of lower rank may be higher between the computed speeds than listed (upper estimates: "
         text += f"{'; '.join(parts)}); compute them with a narrower range of --speeds"
         first = min(own["rank"] for own in higher)
         yield Finding("warning" if first <= FIRST_RANKS else "note", text, max(own["excess"] for own in higher))

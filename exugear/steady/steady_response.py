@@ -25,6 +25,7 @@ from exugear.steady.balance.stability import growth_of_state
 from exugear.steady.campbell import Campbell, ModeTracks, campbell_of, modes_over_speed
 from exugear.steady.crossings import (
     HARMONICS,
+    WIDE,
     Contributions,
     Crossing,
     contributions,
@@ -39,7 +40,7 @@ from exugear.steady.harmonics.lines import LineSet
 from exugear.steady.mean_system.mean_system import Steps
 from exugear.steady.mean_system.mesh_places import DEFLECTION
 from exugear.steady.mean_system.planet_sets import SteadyError
-from exugear.steady.mean_system.signals import SURFACE_VELOCITY, Quantity, SignalName
+from exugear.steady.mean_system.signals import SURFACE_VELOCITY, SignalName
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.settings import (
     SteadySettings,
@@ -53,6 +54,7 @@ from exugear.steady.tops import (
     LOUDEST_BESIDE_OTHERS,
     HigherBetween,
     KnownTops,
+    ResponseCurves,
     higher_between,
     missed_flanks,
     missed_tops,
@@ -306,7 +308,7 @@ PEAKS_WITH_CONTRIBUTIONS = 20
 """Crossings whose peaks are taken apart."""
 LINES_WITH_CONTRIBUTIONS = 5
 """Loudest lines whose sound power is explained."""
-ROUNDS = 5
+ROUNDS = 8
 """Times that tops, and then speeds on flanks, are looked for between speeds, at most."""
 SLOWEST_BRANCH = 0.01
 """Share of the fastest speed at which a branch from standstill begins."""
@@ -369,11 +371,13 @@ def response_of(
     if settings.branches:
         points, folds, ended = _follow_branch(solver, settings.speeds.first, settings.speeds.last, report)
     else:
-        points = _empty(solver.model, with_crossings(even, found))
+        # Without contact loss, curves through the neighbours of a wide resonance show its top.
+        curved = settings.method != "nonlinear" and not model.loses_contact
+        points = _empty(solver.model, with_crossings(even, found, WIDE if curved else math.inf))
         solve = partial(_solve_from, known=known, progress=report, keep=keep, keep_every=keep_every)
         solve(points, 0, lambda: solver, follows=settings.method == "nonlinear")
         if at_resonances:
-            points, higher = _with_tops(solver, points, operation, solve)
+            points, higher = _with_tops(solver, points, operation, tracks.least_damping, solve)
         points = points.part(np.argsort(points.speed, kind="stable"))
     is_solved = np.isfinite(points.drive_torque)
     if not is_solved.any():
@@ -457,7 +461,11 @@ def _tracks(model: HarmonicBalanceModel, speeds: Floats) -> ModeTracks:
 
 
 def _with_tops(
-    solver: PointSolver, points: SolvedPoints, operation: tuple[float, float] | None, solve: Callable[..., None]
+    solver: PointSolver,
+    points: SolvedPoints,
+    operation: tuple[float, float] | None,
+    damping: float,
+    solve: Callable[..., None],
 ) -> tuple[SolvedPoints, tuple[HigherBetween, ...]]:
     """Solve at speeds where neighbours indicate peaks higher than at any known speed, until none remain.
 
@@ -469,16 +477,20 @@ def _with_tops(
     model = solver.model
     loudest = LOUDEST_BESIDE_OTHERS if model.waves.neighbours else LOUDEST
 
-    def smooth_curves() -> tuple[Floats, SingleComplexes, Booleans, tuple[Quantity, ...], tuple[float, float] | None]:
-        """Return what the functions of `exugear.steady.tops` take of the solved points, by ascending speed."""
+    def curves() -> ResponseCurves:
+        """Return the response over the speeds that are solved."""
         is_solved = np.flatnonzero(np.isfinite(points.drive_torque))
         order = is_solved[np.argsort(points.speed[is_solved], kind="stable")]
         smooth = np.asarray(~(points.apart.any(axis=1) | points.free.any(axis=1)))[order]
-        return points.speed[order], points.amplitude[order], smooth, model.quantities, operation
+        speed = points.speed[order]
+        audible = None
+        if model.radiated is not None:
+            audible = line_frequencies(speed, model.lines.orders) <= model.radiated.limit
+        return ResponseCurves(speed, points.amplitude[order], smooth, model.quantities, operation, damping, audible)
 
     for missed in (partial(missed_tops, known=tops, count=loudest), missed_flanks):
         for _ in range(ROUNDS):
-            more = missed(*smooth_curves())
+            more = missed(curves())
             if not more.size:
                 break
             count = len(points.speed)
@@ -487,11 +499,7 @@ def _with_tops(
             # A speed that was not requested and has no steady state is dropped without a warning.
             kept = (np.arange(len(points.speed)) < count) | np.isfinite(points.drive_torque)
             points = points if kept.all() else points.part(kept)
-    curves = smooth_curves()
-    audible = None
-    if model.radiated is not None:
-        audible = line_frequencies(curves[0], model.lines.orders) <= model.radiated.limit
-    return points, higher_between(*curves, tops, audible)
+    return points, higher_between(curves(), tops)
 
 
 def _solve_from(

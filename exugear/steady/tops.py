@@ -8,7 +8,7 @@ predicts the top.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -17,7 +17,7 @@ import numpy as np
 from exugear.steady.crossings import COINCIDE, in_operation
 from exugear.steady.harmonics.branches import NEIGHBOURS, peaks_of_lines, predicted_tops
 from exugear.steady.mean_system.signals import SURFACE_VELOCITY, Quantity
-from fe_ste.tools.arrays import Booleans, Floats, SingleComplexes
+from fe_ste.tools.arrays import Booleans, Complexes, Floats, SingleComplexes
 
 Peak = tuple[int, int]
 """Point and line."""
@@ -33,6 +33,8 @@ LEAST_STAND = 1e-4
 """Relative prominence of a peak at the known speeds from which it is refined: its maximum may be higher."""
 GAIN = 1e-3
 """Relative excess of a maximum over its peak at the known speeds from which it is evaluated."""
+DAMPED = 0.5
+"""Share of the lowest damping ratio below which the pole of a curve is none of the system."""
 NOTICED = 0.01
 """Relative excess of a maximum over its peak from which it is reported where it was not evaluated."""
 APART = 0.25
@@ -44,44 +46,91 @@ FLANK = (0.6, 1.2)
 86 % and 64 % of it."""
 
 
-def missed_tops(
-    speeds: Floats,
-    amplitude: SingleComplexes,
-    smooth: Booleans,
-    quantities: Sequence[Quantity],
-    operation: tuple[float, float] | None,
-    known: KnownTops | None = None,
-    count: int = LOUDEST,
-) -> Floats:
+@dataclass(frozen=True, eq=False)
+class ResponseCurves:
+    """A response over the speeds at which it is known."""
+
+    speed: Floats
+    """(n,) of the overall input, ascending, rad/s."""
+    amplitude: SingleComplexes
+    """(n, lines, signals), the mean as the first line."""
+    smooth: Booleans
+    """(n,) where the response is smooth over speed: not with contact loss."""
+    quantities: Sequence[Quantity]
+    """Quantities whose peaks are evaluated."""
+    operation: tuple[float, float] | None
+    """Operating speed range, whose highest peaks are ranked separately, rad/s without sign."""
+    damping: float
+    """Lowest damping ratio of the system."""
+    audible: Booleans | None = None
+    """(n, lines) where the surface velocity is ranked; None for everywhere."""
+
+    @property
+    def inside(self) -> Booleans:
+        """(n,) which speeds are in operation."""
+        return in_operation(self.speed, self.operation)
+
+    def sizes(self, quantity: Quantity) -> Floats:
+        """Return the amplitudes (n, lines - 1, places) of a quantity, zero where it is not ranked."""
+        found = quantity.sizes(self.amplitude[:, 1:])
+        if self.audible is not None and quantity.name == SURFACE_VELOCITY.name:
+            found[~self.audible[:, 1:]] = 0.0
+        return found
+
+    def tops(self, quantity: Quantity, sizes: Floats, peaks: list[Peak], known: KnownTops) -> dict[Peak, list[float]]:
+        """Predict speed and height of the tops of peaks; those whose neighbours are not smooth are left out.
+
+        `sizes` are those of the quantity. Tops that are not `known` yet are added to it.
+        """
+        keys: dict[Peak, tuple[str, int, int, int, bytes]] = {}
+        # Curves at one place whose peaks have as many neighbours on either side are evaluated together.
+        alike: dict[tuple[int, int, int], list[Peak]] = {}
+        for point, line in peaks:
+            around = _around(point, len(self.speed))
+            if self.smooth[around].all():
+                place, before = int(sizes[point, line].argmax()), point - around.start
+                key = keys[point, line] = quantity.name, line, place, before, self.speed[around].tobytes()
+                if key not in known:
+                    alike.setdefault((place, before, around.stop - around.start), []).append((point, line))
+        for (place, before, count), found in alike.items():
+            points, lines = np.array(found).T
+            at = points[:, None] - before + np.arange(count)
+            values = quantity.components(self.amplitude[at, lines[:, None] + 1], place)
+            size: Callable[[Complexes], Floats] = partial(quantity.size, place=place)
+            if quantity.name == SURFACE_VELOCITY.name:
+                # Without a phase it is no rational function of speed; its square is one.
+                values, size = np.abs(values) ** 2, _root
+            tops = predicted_tops(self.speed[at], values, before, size, DAMPED * self.damping)
+            known |= zip([keys[peak] for peak in found], np.transpose(tops).tolist(), strict=True)
+        return {peak: known[key] for peak, key in keys.items()}
+
+
+def missed_tops(curves: ResponseCurves, known: KnownTops | None = None, count: int = LOUDEST) -> Floats:
     """Return speeds at which the peaks of the highest tops exceed every known speed, by curves through neighbours.
 
     Parameters
     ----------
-    speeds : (n,) ascending, rad/s
-    amplitude : (n, lines, signals) of all signals, the mean as the first line
-    smooth : (n,) where the response is smooth over speed: not with contact loss
-    quantities : quantities whose peaks are evaluated
-    operation : operating speed range, whose highest peaks are ranked separately, rad/s without sign
     known : dict, optional
         Maxima found between the same speeds before; newly found ones are added.
     count : number of tops of each quantity that are evaluated, of all speeds and of the range of operation
     """
-    if len(speeds) < NEIGHBOURS:
+    speed = curves.speed
+    if len(speed) < NEIGHBOURS:
         return np.zeros(0)
     known = {} if known is None else known
     tops: list[float] = []
-    inside = in_operation(speeds, operation)
-    for quantity in quantities:
-        sizes = quantity.sizes(amplitude[:, 1:])
+    inside = curves.inside
+    for quantity in curves.quantities:
+        sizes = curves.sizes(quantity)
         highest = sizes.max(axis=2)
         peaks = sorted(peaks_of_lines(highest, LEAST_STAND), key=lambda peak: -highest[peak])
-        predicted = _predicted(_first(peaks, PREDICTED, inside), speeds, amplitude, smooth, quantity, sizes, known)
+        predicted = curves.tops(quantity, sizes, _first(peaks, PREDICTED, inside), known)
         by_height = sorted(predicted, key=lambda peak: -predicted[peak][1])
         for point, line in _first(by_height, count, inside):
             top, height = predicted[point, line]
-            near = APART * (speeds[point + 1] - speeds[point - 1])
+            near = APART * (speed[point + 1] - speed[point - 1])
             new = all(abs(top - other) > near for other in tops)
-            new &= bool((np.abs(speeds[_around(point, len(speeds))] - top) > COINCIDE * abs(top)).all())
+            new &= bool((np.abs(speed[_around(point, len(speed))] - top) > COINCIDE * abs(top)).all())
             if new and height > (1.0 + GAIN) * highest[point, line]:
                 tops.append(top)
     return np.sort(np.array(tops))
@@ -98,68 +147,28 @@ class HigherBetween:
     """Relative, the largest of them."""
 
 
-def higher_between(
-    speeds: Floats,
-    amplitude: SingleComplexes,
-    smooth: Booleans,
-    quantities: Sequence[Quantity],
-    operation: tuple[float, float] | None,
-    known: KnownTops,
-    audible: Booleans | None = None,
-) -> tuple[HigherBetween, ...]:
-    """Find what `missed_tops`, of whose parameters these are, left out among the `PREDICTED` highest peaks.
+def higher_between(curves: ResponseCurves, known: KnownTops) -> tuple[HigherBetween, ...]:
+    """Find what `missed_tops` left out among the highest peaks; `known` tops are not predicted again.
 
-    Parameters
-    ----------
-    audible : (n, lines), optional
-        Where the surface velocity is ranked.
+    These are estimates: the response was not computed at the tops.
     """
     found = []
-    inside = in_operation(speeds, operation)
-    for quantity in quantities if len(speeds) >= NEIGHBOURS else ():
-        sizes = quantity.sizes(amplitude[:, 1:])
+    inside = curves.inside
+    for quantity in curves.quantities if len(curves.speed) >= NEIGHBOURS else ():
+        sizes = curves.sizes(quantity)
         highest = sizes.max(axis=2)
-        if audible is not None and quantity.name == SURFACE_VELOCITY.name:
-            highest[~audible[:, 1:]] = 0.0
         peaks = [peak for peak in peaks_of_lines(highest) if inside[peak[0]]]
         ranked = sorted(peaks, key=lambda peak: -highest[peak])[:PREDICTED]
-        predicted = _predicted(ranked, speeds, amplitude, smooth, quantity, sizes, known)
-        excess = np.array([predicted[peak][1] / highest[peak] - 1.0 if peak in predicted else 0.0 for peak in ranked])
+        tops = curves.tops(quantity, sizes, ranked, known)
+        excess = np.array([tops[peak][1] / highest[peak] - 1.0 if peak in tops else 0.0 for peak in ranked])
         if (noticed := np.flatnonzero(excess > NOTICED)).size:
             found.append(HigherBetween(quantity.name, int(noticed[0]) + 1, float(excess.max())))
     return tuple(found)
 
 
-def _predicted(
-    peaks: list[Peak],
-    speeds: Floats,
-    amplitude: SingleComplexes,
-    smooth: Booleans,
-    quantity: Quantity,
-    sizes: Floats,
-    known: KnownTops,
-) -> dict[Peak, list[float]]:
-    """Return speed and height of the tops of peaks, without those whose neighbours are not smooth.
-
-    `sizes` (n, lines - 1, places) are those of the quantity; tops that are not `known` yet are added to it.
-    """
-    keys: dict[Peak, tuple[str, int, int, int, bytes]] = {}
-    # Curves at one place whose peaks have as many neighbours on either side are evaluated together.
-    alike: dict[tuple[int, int, int], list[Peak]] = {}
-    for point, line in peaks:
-        around = _around(point, len(speeds))
-        if smooth[around].all():
-            place = int(sizes[point, line].argmax())
-            key = keys[point, line] = quantity.name, line, place, point - around.start, speeds[around].tobytes()
-            if key not in known:
-                alike.setdefault((place, point - around.start, around.stop - around.start), []).append((point, line))
-    for (place, before, points_around), found in alike.items():
-        points, lines = np.array(found).T
-        at = points[:, None] - before + np.arange(points_around)
-        values = quantity.components(amplitude[at, lines[:, None] + 1], place)
-        tops = predicted_tops(speeds[at], values, before, partial(quantity.size, place=place))
-        known |= zip([keys[peak] for peak in found], np.transpose(tops).tolist(), strict=True)
-    return {peak: known[key] for peak, key in keys.items()}
+def _root(squares: Complexes) -> Floats:
+    """Return the surface velocity from its mean square (..., 1), which is a rational function of speed."""
+    return np.asarray(np.sqrt(np.maximum(squares[..., 0].real, 0.0)))
 
 
 def _first(peaks: list[Peak], count: int, inside: Booleans) -> list[Peak]:
@@ -168,36 +177,29 @@ def _first(peaks: list[Peak], count: int, inside: Booleans) -> list[Peak]:
     return list(dict.fromkeys(peaks[:count] + operating[:count]))
 
 
-def missed_flanks(
-    speeds: Floats,
-    amplitude: SingleComplexes,
-    smooth: Booleans,
-    quantities: Sequence[Quantity],
-    operation: tuple[float, float] | None,
-) -> Floats:
+def missed_flanks(curves: ResponseCurves) -> Floats:
     """Return speeds beside the highest peaks that are drawn as triangles: with fewer than two points above half height.
-
-    Parameters are those of `missed_tops`.
 
     Notes
     -----
     Near the top A of a resonance the amplitude at a distance d is A / sqrt(1 + (d / w)^2). The first point below A / 2
     on a flank gives w. Other modes may add to that point, and w is too large; the next call then comes closer.
     """
-    inside = in_operation(speeds, operation)
+    inside = curves.inside
+    speed = curves.speed
     more: list[float] = []
-    for quantity in quantities:
-        sizes = quantity.sizes(amplitude[:, 1:]).max(axis=2)
+    for quantity in curves.quantities:
+        sizes = curves.sizes(quantity).max(axis=2)
         peaks = [peak for peak in peaks_of_lines(sizes) if inside[peak[0]]]
         for point, line in sorted(peaks, key=lambda peak: -sizes[peak])[:DRAWN]:
-            if smooth[_around(point, len(speeds))].all():
+            if curves.smooth[_around(point, len(speed))].all():
                 for side in (slice(point, None), slice(point, None, -1)):
-                    more += _on_flank(speeds[side], sizes[side, line])
-    taken = list(speeds)
-    for speed in sorted(more):
-        if np.abs(np.array(taken) - speed).min() > COINCIDE * abs(speed):
-            taken.append(speed)
-    return np.array(taken[len(speeds) :])
+                    more += _on_flank(speed[side], sizes[side, line])
+    taken = list(speed)
+    for added in sorted(more):
+        if np.abs(np.array(taken) - added).min() > COINCIDE * abs(added):
+            taken.append(added)
+    return np.array(taken[len(speed) :])
 
 
 def _on_flank(speeds: Floats, amplitude: Floats) -> list[float]:

@@ -22,7 +22,7 @@ import numpy as np
 import scipy.linalg
 
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError, solve_lines
-from fe_ste.tools.arrays import Complexes, Floats, Integers
+from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
 from fe_ste.tools.compilation import compiled
 
 Residual = Callable[[Complexes, float], tuple[Complexes, Any]]
@@ -320,7 +320,7 @@ def find_standing(values: Floats, stands: float, found: Integers) -> int:
 
 
 def predicted_tops(
-    places: Floats, values: Complexes, highest: int, size: Callable[[Complexes], Floats]
+    places: Floats, values: Complexes, highest: int, size: Callable[[Complexes], Floats], damping: float = 0.0
 ) -> tuple[Floats, Floats]:
     """Places and heights (k,) of the tops near the highest of some values of k curves, by curves through neighbours.
 
@@ -330,6 +330,9 @@ def predicted_tops(
     values : (k, n, signals) all signals of a curve have the same poles
     highest : which place is the highest, neither the first nor the last
     size : returns the heights (...) of values (..., signals)
+    damping : lowest damping ratio, a share of a place
+        Curves with a pole closer to the real axis between the two neighbours of the highest value are left out: such a
+        pole is not one of the system.
 
     Notes
     -----
@@ -350,14 +353,14 @@ def predicted_tops(
     found = [(places[:, highest], size(values)[:, highest])]
     # Where curves through other neighbours differ, the highest is to be looked at.
     for first in range(max(highest - 3, 0), min(highest, places.shape[1] - NEIGHBOURS + 1)):
-        found.append(_tops(places, values, highest, first, size))
+        found.append(_tops(places, values, highest, first, size, damping))
     tops, heights = np.swapaxes(found, 0, 1)
     which = heights.argmax(axis=0)
     return np.choose(which, tops), heights.max(axis=0)
 
 
 def _tops(
-    places: Floats, values: Complexes, highest: int, first: int, size: Callable[[Complexes], Floats]
+    places: Floats, values: Complexes, highest: int, first: int, size: Callable[[Complexes], Floats], damping: float
 ) -> tuple[Floats, Floats]:
     """Places and heights (k,) of the tops near a place by the curves through five places from one on."""
     middle = places[:, highest]
@@ -372,13 +375,15 @@ def _tops(
     weights = np.linalg.svd(loewner)[2][:, -1].conj()
     low, high = scaled[:, highest - 1], scaled[:, highest + 1]
     top = np.zeros(len(x))
-    height = size(values)[:, highest]
+    known = height = size(values)[:, highest]
+    undamped = _is_undamped(carrying, weights, low, high, damping * np.abs(middle) / width)
     for _ in range(CLOSER):
         step = (high - low) / LOOKED_AT
         at = np.linspace(low, high, LOOKED_AT, axis=-1)
         beside = at[..., None] - carrying[:, None, :]
         parts = weights[:, None, :] / np.where(beside == 0.0, NODE_DISTANCE, beside)
-        found = size((parts @ f[:, SUPPORT]) / parts.sum(axis=2)[..., None])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            found = np.nan_to_num(size((parts @ f[:, SUPPORT]) / parts.sum(axis=2)[..., None]), posinf=0.0)  # at a pole
         best = found.argmax(axis=1)[:, None]
         risen = np.take_along_axis(found, best, axis=1)[:, 0] > height
         top = np.where(risen, np.take_along_axis(at, best, axis=1)[:, 0], top)
@@ -386,4 +391,32 @@ def _tops(
         # A curve that rises no more is not looked at more closely.
         low = np.where(risen, np.maximum(low, top - step), low)
         high = np.where(risen, np.minimum(high, top + step), high)
-    return middle + top * width, height
+    return middle + np.where(undamped, 0.0, top) * width, np.where(undamped, known, height)
+
+
+def _is_undamped(nodes: Floats, weights: Complexes, low: Floats, high: Floats, least: Floats) -> Booleans:
+    """Return which curves (k,) have a pole between two places that is closer to the real axis than a distance.
+
+    The poles are the zeros of sum w_i / (x - s_i), of a quadratic polynomial with three nodes s (k, 3).
+
+    Examples
+    --------
+    Poles at 0.5 +- 0.2i; the weights are those of their polynomial, w_i = q(s_i) / product (s_i - s_j):
+
+    >>> s = np.array([[0.0, 1.0, 2.0]])
+    >>> weights = ((s - 0.5) ** 2 + 0.2**2) / np.array([2.0, -1.0, 2.0])
+    >>> [bool(_is_undamped(s, weights, 0.0, 1.0, np.array([least]))[0]) for least in (0.19, 0.21)]
+    [False, True]
+    """
+    one, two, three = nodes.T
+    first, second, third = weights.T
+    a = first + second + third
+    b = -(first * (two + three) + second * (one + three) + third * (one + two))
+    c = first * two * three + second * one * three + third * one * two
+    root = np.sqrt((b**2 - 4.0 * a * c).astype(np.complex128))
+    # One zero by the sum without cancellation, the other by their product c / a.
+    half = -0.5 * (b + np.where((b.conj() * root).real >= 0.0, root, -root))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        poles = np.array([half / a, c / half])
+    found = (poles.real >= low) & (poles.real <= high) & (np.abs(poles.imag) < least)
+    return np.asarray(found.any(axis=0))

@@ -166,7 +166,10 @@ def test_peaks_that_are_known_between_speeds_only_are_estimated_and_a_narrower_r
     assert all(own < 0.011 for own, _ in excess[: found["force"].rank - 1])
     finding = next(own for own in response_findings(to_dataset(few)) if "between the computed speeds" in own.text)
     assert finding.level == "warning"
-    assert f"bearing force from rank {found['force'].rank} on, by up to {100.0 * most:.1f} %" in finding.text
+    assert (
+        f"bearing force from rank {found['force'].rank} on, by up to {100.0 * found['force'].excess:.0f} %"
+        in finding.text
+    )
     narrow = response_of(parallel, SteadySettings(SpeedRange(0.985 * at, 1.015 * at, 20), harmonics=4))
     assert not narrow.higher_between
 

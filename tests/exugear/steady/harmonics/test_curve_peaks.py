@@ -54,6 +54,27 @@ def test_a_top_beside_the_end_of_the_places_is_found_as_well():
     assert height > abs(two_modes(x[1], 1.5))
 
 
+def test_a_curve_whose_pole_is_less_damped_than_any_mode_predicts_no_top():
+    """One value off by a tenth of a percent puts a pole next to the real axis where the response has no resonance."""
+    x = np.linspace(0.4, 0.6, 11)[None]
+    values = (1.0 + 0.02 * np.exp(-(((x - 0.5) / 0.1) ** 2))).astype(np.complex128)[..., None]
+    values[0, 5] *= 1.001
+    known = float(np.abs(values[0, 5, 0]))
+    spurious = predicted_tops(x, values, 5, SIZE)[1]
+    assert spurious > 1.5 * known
+    place, height = predicted_tops(x, values, 5, SIZE, damping=0.005)
+    assert (place, height) == (pytest.approx([0.5]), pytest.approx([known]))
+
+
+@pytest.mark.parametrize("damping", [0.002, 0.01])
+def test_a_damped_pole_is_kept(damping):
+    x = np.array([0.97, 0.985, 0.996, 1.008, 1.022])
+    values = (1.0 / (1.0 - x**2 + 2j * damping * x))[None, :, None]
+    limited = predicted_tops(x[None], values, 2, SIZE, damping=0.5 * damping)
+    np.testing.assert_array_equal(limited, predicted_tops(x[None], values, 2, SIZE))
+    assert limited[1] == pytest.approx([0.5 / damping], rel=2e-3)
+
+
 @pytest.mark.parametrize("stands", [0.0, 1e-4, 0.01, 0.5])
 def test_peaks_stand_as_scipy_has_their_prominences(stands):
     """Random walks, rounded so that many neighbours are equal, and a plateau at either end."""
