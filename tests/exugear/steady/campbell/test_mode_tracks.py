@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -101,3 +103,13 @@ def test_a_mode_that_leaves_the_range_of_frequencies_ends_and_others_go_on():
 def test_one_speed_has_its_modes():
     tracks = mode_tracks(uncoupled(0.0), 0.2, 0.2)
     np.testing.assert_allclose(2.0 * np.pi * tracks.frequency, [[8.0, 10.0]], rtol=1e-7)
+
+
+def test_the_least_damping_is_that_of_the_fastest_mode_of_equal_dampers():
+    """Damping d / 2 w of the critical; the rising mode reaches 20 rad/s, and gaps of modes that end do not count."""
+    tracks = mode_tracks(uncoupled(0.0), 0.0, 1.0)
+    assert tracks.least_damping == pytest.approx(1e-3 / (2.0 * 20.0), rel=1e-6)
+    eigenvalues = tracks.eigenvalues.copy()
+    eigenvalues[:, np.argmax(tracks.frequency[-1])] = np.nan
+    assert replace(tracks, eigenvalues=eigenvalues).least_damping == pytest.approx(1e-3 / (2.0 * 10.0), rel=1e-6)
+    assert replace(tracks, eigenvalues=np.full_like(eigenvalues, np.nan)).least_damping == 0.0
