@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import signal
 import traceback
 from collections.abc import Iterator
@@ -9,6 +10,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import pytest
+import typer.main
 import typer.testing
 
 TRACEBACK = "traceback of a command"
@@ -50,6 +52,14 @@ def terminal_signals() -> Iterator[None]:
 def terminal_signals_of_module() -> Iterator[None]:
     """`terminal_signals` for a process that all tests of a file share."""
     with signals_of_a_terminal():
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def commands_built_once() -> Iterator[None]:
+    """Build the commands and options of an application once, not for each command that a test runs."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("typer.testing._get_command", functools.cache(typer.main.get_command), raising=False)
         yield
 
 
