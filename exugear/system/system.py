@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import astuple, dataclass, field, replace
 from functools import cached_property
@@ -300,24 +299,24 @@ class Assembly(ReprMixin):
     def forces(self, q: Floats, v: Floats, meshes: MeshArrays | None = None) -> Floats:
         """Generalized forces of meshes, bearings, couplings, elastic bodies and weight, N and N m.
 
-        At one state or several: (..., size), as the coordinates and velocities have it.
+        At one state (size,) or several (n, size), as the coordinates and velocities have it.
         """
         meshes = self.meshes if meshes is None else meshes
         if q.ndim == 1:
-            f = self._forces_but_of_connectors(q, v, meshes)
+            f = self._forces_of_kernels(q, v, meshes)
         else:
-            f = np.array([self._forces_but_of_connectors(x, u, meshes) for x, u in zip(q, v, strict=True)])
+            f = np.array([self._forces_of_kernels(x, u, meshes) for x, u in zip(q, v, strict=True)])
+        for name, body in self.turning.items():
+            elastic_slice = self.elastic_slices[name]
+            f[..., elastic_slice] += body.forces(q[..., elastic_slice].T, v[..., elastic_slice].T).T
         add_connector_forces(q, v, self.connectors, f)
         return f + self.constant_forces
 
-    def _forces_but_of_connectors(self, q: Floats, v: Floats, meshes: MeshArrays) -> Floats:
+    def _forces_of_kernels(self, q: Floats, v: Floats, meshes: MeshArrays) -> Floats:
         f = self.mesh_forces(q, v, meshes)
         add_spring_forces(q, v, self.springs, f)
         if self.elastic_bodies:
             add_elastic_forces(q, v, self.elastic, scratch_for(self.elastic), f)
-        for name, body in self.turning.items():
-            elastic_slice = self.elastic_slices[name]
-            f[elastic_slice] += body.forces(q[elastic_slice], v[elastic_slice])
         if self.modal is not None:
             add_modal_damping(q, v, cached_bundle(self.modal), modal_memory(self.modal), f)
         return f
@@ -504,7 +503,10 @@ class Assembly(ReprMixin):
         return body.axis[0] - carrier.axis[0] + float(q[o]), body.axis[1] - carrier.axis[1] + float(q[o + 1])
 
     def bearing_loads(self, q: Floats, v: Floats) -> Floats:
-        """Force and moment that each bearing takes from its body, (bearings, 6), global axes, N and N m."""
+        """Force and moment that each bearing takes from its body, (..., bearings, 6), global axes, N and N m.
+
+        At one state or several: (..., size), as the coordinates and velocities have it.
+        """
         return connector_loads(q, v, self.connectors)
 
     def support_loads_at_rest(self, q: Floats) -> Floats:
@@ -528,28 +530,26 @@ class Assembly(ReprMixin):
         return out
 
     def inertia_forces(self, q: Floats, v: Floats, a: Floats) -> Floats:
-        """Generalized forces that the accelerations a need, shape (size,): the inverse of `accelerations`."""
-        f = np.zeros(self.size)
-        for n, o in enumerate(self.inertia.body):
-            mass = self.inertia.mass[n]
-            jt = self.inertia.transverse[n]
-            ja = self.inertia.axial[n]
-            sb = math.sin(q[o + 4])
-            cb = math.cos(q[o + 4])
-            da = v[o + 3]
-            db = v[o + 4]
-            p = ja * (v[o + 5] + da * sb)
-            f[o : o + 3] = mass * a[o : o + 3]
-            f[o + 5] = ja * (a[o + 5] + a[o + 3] * sb + da * db * cb)
-            f[o + 3] = jt * cb**2 * a[o + 3] + f[o + 5] * sb + p * db * cb - 2.0 * jt * da * db * sb * cb
-            f[o + 4] = jt * a[o + 4] + jt * da**2 * sb * cb - p * da * cb
-        f[self.inertia.spin] = self.inertia.spin_inertia * a[self.inertia.spin]
+        """Generalized forces that the accelerations a need, (size,) or (n, size): the inverse of `accelerations`."""
+        f = np.zeros(np.broadcast_shapes(q.shape, v.shape, a.shape))
+        first = self.inertia.body
+        mass, jt, ja = self.inertia.mass, self.inertia.transverse, self.inertia.axial
+        sb, cb = np.sin(q[..., first + 4]), np.cos(q[..., first + 4])
+        da, db, spin = (v[..., first + n] for n in (3, 4, 5))
+        p = ja * (spin + da * sb)
+        moves = first[:, None] + np.arange(3)
+        f[..., moves] = mass[:, None] * a[..., moves]
+        about_z = ja * (a[..., first + 5] + a[..., first + 3] * sb + da * db * cb)
+        f[..., first + 5] = about_z
+        f[..., first + 3] = jt * cb**2 * a[..., first + 3] + about_z * sb + p * db * cb - 2.0 * jt * da * db * sb * cb
+        f[..., first + 4] = jt * a[..., first + 4] + jt * da**2 * sb * cb - p * da * cb
+        f[..., self.inertia.spin] = self.inertia.spin_inertia * a[..., self.inertia.spin]
         for name, elastic_slice in self.elastic_slices.items():
-            f[elastic_slice] = self.elastic_bodies[name].reduced.mass @ a[elastic_slice]
             if name in self.turning:
-                f[elastic_slice] = self.turning[name].inertia_forces(
-                    q[elastic_slice], v[elastic_slice], a[elastic_slice]
-                )
+                states = (np.broadcast_to(values, f.shape)[..., elastic_slice].T for values in (q, v, a))
+                f[..., elastic_slice] = self.turning[name].inertia_forces(*states).T
+            else:
+                f[..., elastic_slice] = a[..., elastic_slice] @ self.elastic_bodies[name].reduced.mass.T
         return f
 
 

@@ -469,8 +469,7 @@ def _mass(frame: RotatingFrame, psi: float, u: Floats) -> Floats:
     t = frame.matrices(psi)[0]
     q, v, a = frame.state(psi, 0.0, u)
     still = assembly.inertia_forces(q, v, a)
-    columns = [assembly.inertia_forces(q, v, a + unit) - still for unit in t.T]
-    return np.asarray(t.T @ np.array(columns).T)
+    return np.asarray(t.T @ (assembly.inertia_forces(q, v, a + t.T) - still).T)
 
 
 def _residuals(frame: RotatingFrame, psi: float, speed: float, u: Floats, du: Floats | None) -> Floats:
@@ -480,10 +479,8 @@ def _residuals(frame: RotatingFrame, psi: float, speed: float, u: Floats, du: Fl
     """
     assembly = frame.assembly
     t = frame.matrices(psi)[0]
-    states = [frame.state(psi, speed, place, None if du is None else du[n]) for n, place in enumerate(u)]
-    q, v, _ = (np.array(values) for values in zip(*states, strict=True))
-    needed = np.array([assembly.inertia_forces(*state) for state in states])
-    return np.asarray((needed - assembly.forces(q, v, frame.mean_meshes)) @ t)
+    q, v, a = frame.state(psi, speed, u, du)
+    return np.asarray((assembly.inertia_forces(q, v, a) - assembly.forces(q, v, frame.mean_meshes)) @ t)
 
 
 def _residual(frame: RotatingFrame, psi: float, speed: float, u: Floats) -> Floats:

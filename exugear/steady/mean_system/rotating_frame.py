@@ -259,14 +259,14 @@ class RotatingFrame:
         return place, rate, bend
 
     def state(self, psi: float, speed: float, u: Floats, du: Floats | None = None, ddu: Floats | None = None) -> Jet:
-        """Coordinates, velocities and accelerations (size,) of the assembly at an input speed (rad/s)."""
+        """Coordinates, velocities and accelerations (..., size) of the assembly at an input speed (rad/s)."""
         (t, t1, t2), (place, rate, bend) = self.matrices(psi), self.rolling(psi)
-        q = place + t @ u
-        v = speed * (rate + t1 @ u)
-        a = speed**2 * (bend + t2 @ u)
+        q = place + u @ t.T
+        v = speed * (rate + u @ t1.T)
+        a = speed**2 * (bend + u @ t2.T)
         if du is not None:
-            v = v + t @ du
-            a = a + 2.0 * speed * (t1 @ du)
+            v = v + du @ t.T
+            a = a + 2.0 * speed * (du @ t1.T)
         if ddu is not None:
-            a = a + t @ ddu
+            a = a + ddu @ t.T
         return q, v, a

@@ -8,7 +8,7 @@ ellipse. For planets it is the rms value over the planets. Of several bearings t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -158,8 +158,11 @@ def _load_rows(system: MeanSystem, frame: RotatingFrame, speed: float, psi: floa
     assembly = frame.assembly
     t, t1, _ = frame.matrices(psi)
     q, v, _ = frame.state(psi, speed, system.static_at(speed))
-    by_q = _slopes(lambda step: _loads(assembly, q + step, v), assembly.size, place_step(assembly))
-    by_v = _slopes(lambda step: _loads(assembly, q, v + step), assembly.size, RATE_STEP)
+    step = place_step(assembly)
+    changes = np.eye(assembly.size)
+    by_q = _loads(assembly, q + step * changes, v) - _loads(assembly, q - step * changes, v)
+    by_v = _loads(assembly, q, v + RATE_STEP * changes) - _loads(assembly, q, v - RATE_STEP * changes)
+    by_q, by_v = by_q.T / (2.0 * step), by_v.T / (2.0 * RATE_STEP)
     turn = support_waves(assembly, frame.sets, psi)[0]
     for values in (by_q, by_v):
         values[: len(turn)] = turn @ values[: len(turn)]
@@ -167,14 +170,10 @@ def _load_rows(system: MeanSystem, frame: RotatingFrame, speed: float, psi: floa
 
 
 def _loads(assembly: Assembly, q: Floats, v: Floats) -> Floats:
-    """Return forces (N), then moments (N m), on the bodies of all supports along the global axes, (6 supports,)."""
+    """Return forces (N), then moments (N m), on the bodies of all supports along the global axes, (..., 6 supports)."""
+    q, v = np.broadcast_arrays(q, v)
     loads = -assembly.bearing_loads(q, v)
-    return np.concatenate([loads[:, :3].ravel(), loads[:, 3:].ravel()])
-
-
-def _slopes(function: Callable[[Floats], Floats], size: int, step: float) -> Floats:
-    columns = [(function(e) - function(-e)) / (2.0 * step) for e in step * np.eye(size)]
-    return np.array(columns).T
+    return np.concatenate([loads[..., part].reshape(*q.shape[:-1], -1) for part in (slice(0, 3), slice(3, 6))], axis=-1)
 
 
 def carried_seats(assembly: Assembly) -> dict[str, bool]:

@@ -223,15 +223,14 @@ def _beyond_mean(
     step = place_step(frame.assembly)
     changes = np.concatenate([0.0 * units[:1], step * units, -step * units])
     rates = np.concatenate([RATE_STEP * units, -RATE_STEP * units])
-    states = [frame.state(psi, speed, u + change)[:2] for change in changes]
-    states += [frame.state(psi, speed, u, rate)[:2] for rate in rates]
-    q, v = (np.array(values) for values in zip(*states, strict=True))
+    du = np.concatenate([0.0 * changes, rates])
+    q, v, _ = frame.state(psi, speed, u + np.concatenate([changes, 0.0 * rates]), du)
     forces = np.zeros((2, *q.shape))
     for own, connectors in zip(forces, both, strict=True):
         add_connector_forces(q, v, connectors, own)
     loads = np.zeros((2, len(q), AXES * len(numbers)))
     for own, connectors in zip(loads, both, strict=True):
-        own[:] = [-connector_loads(*state, connectors)[:, :AXES].ravel() for state in zip(q, v, strict=True)]
+        own[:] = -connector_loads(q, v, connectors)[..., :AXES].reshape(len(q), -1)
     entries = (AXES * numbers[:, None] + np.arange(AXES)).ravel()
     turn = support_waves(frame.assembly, frame.sets, psi)[0][np.ix_(entries, entries)]
     generalized = ((forces[0] - forces[1]) @ frame.matrices(psi)[0])[:, coordinates]

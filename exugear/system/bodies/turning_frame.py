@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,7 +17,7 @@ from fe_ste.tools.arrays import Floats
 
 @dataclass(frozen=True)
 class TurningBody:
-    """An elastic body in its own turning frame; n coordinates."""
+    """An elastic body in its own turning frame; n coordinates, of one state (n,) or of several (n, k)."""
 
     reduced: ReducedBody
     """In the frame "carrier"."""
@@ -64,11 +63,10 @@ class TurningBody:
         end = 6 * self.seat_count
         return (slice(UX, end, 6), slice(UY, end, 6)), (slice(TILT_X, end, 6), slice(TILT_Y, end, 6))
 
-    def rotated(self, vector: Floats, angle: float) -> Floats:
-        """Turn the vectors of the seats in (n, ...) by an angle (rad) about z."""
+    def rotated(self, vector: Floats, angle: float | Floats) -> Floats:
+        """Turn the vectors of the seats in (n, ...) by an angle (rad) about z, or each state (n, k) by its own (k,)."""
         out = np.array(vector, dtype=np.float64)
-        c = math.cos(angle)
-        s = math.sin(angle)
+        c, s = np.cos(angle), np.sin(angle)
         for x, y in self._planar_coordinates:
             out[x], out[y] = c * vector[x] - s * vector[y], s * vector[x] + c * vector[y]
         return out
@@ -80,49 +78,57 @@ class TurningBody:
             out[x], out[y] = -vector[y], vector[x]
         return out
 
-    def angle(self, q: Floats) -> float:
-        """Angle psi of the frame at coordinates q, or its speed at velocities."""
-        return float(self.angle_weights @ q)
+    def angle(self, q: Floats) -> Floats:
+        """Angle psi of the frame at coordinates q, or its speed at velocities, () or (k,)."""
+        return np.asarray(self.angle_weights @ q)
 
     def to_body_frame(self, q: Floats) -> Floats:
-        """Displacements in the frame at coordinates q, both (n,)."""
-        places = -self.quarter_turned(self.reduced.spin)  # the rigid spin moves a place by itself, a quarter turn on
+        """Displacements in the frame at coordinates q."""
+        places = self._of_states(-self.quarter_turned(self.reduced.spin), q)  # the rigid spin, a quarter turn on
         angle = self.angle(q)
         out: Floats = self.rotated(np.asarray(q + places), -angle) - places
         out[SPIN : 6 * self.seat_count : 6] -= angle
         return out
 
+    def _of_states(self, vector: Floats, states: Floats) -> Floats:
+        """Return a vector (n,) as it combines with each of some states."""
+        return vector.reshape(-1, *(1,) * (states.ndim - 1))
+
     def forces(self, q: Floats, v: Floats) -> Floats:
-        """Generalized forces of elasticity, damping and weight, (n,)."""
+        """Generalized forces of elasticity, damping and weight."""
         angle = self.angle(q)
         speed = self.angle(v)
         displacements = self.to_body_frame(q)
         around = self.quarter_turned(displacements)
-        rates = self.rotated(v, -angle) - speed * (self.reduced.spin + around)
+        rates = self.rotated(v, -angle) - speed * (self._of_states(self.reduced.spin, q) + around)
         elastic = -self.reduced.stiffness @ (displacements + self.damping_time * rates)
         falling = np.zeros_like(q)
         for axis in (UX, UY, UZ):
             falling[axis : 6 * self.seat_count : 6] = self.gravity[axis]
         weight = self.reduced.mass @ self.rotated(falling, -angle)
         # Turning the frame alone changes the displacements in it: elastic forces act on its angle.
-        return np.asarray(self.rotated(elastic + weight, angle) - (around @ elastic) * self.angle_weights)
+        torque = np.einsum("n...,n...", around, elastic)
+        return np.asarray(self.rotated(elastic + weight, angle) - torque * self._of_states(self.angle_weights, q))
 
-    def apparent_forces(self, v: Floats, angle: float) -> Floats:
-        """Coriolis and centrifugal forces in the frame, Omega h - (w . h) s, (n,)."""
+    def apparent_forces(self, v: Floats, angle: float | Floats) -> Floats:
+        """Coriolis and centrifugal forces in the frame, Omega h - (w . h) s."""
         speed = self.angle(v)
         w = self.rotated(v, -angle)
-        apparent = speed * self.centrifugal - self.coriolis @ (w - speed * self.reduced.spin)
+        spin, centrifugal, weights = (
+            self._of_states(vector, v) for vector in (self.reduced.spin, self.centrifugal, self.angle_weights)
+        )
+        apparent = speed * centrifugal - self.coriolis @ (w - speed * spin)
         # What is taken from the frame's angle leaves no power to them.
-        return np.asarray(speed * apparent - (w @ apparent) * self.angle_weights)
+        return np.asarray(speed * apparent - np.einsum("n...,n...", w, apparent) * weights)
 
     def inertia_forces(self, q: Floats, v: Floats, a: Floats) -> Floats:
-        """Generalized forces that accelerations a need, all (n,)."""
+        """Generalized forces that accelerations a need."""
         angle = self.angle(q)
         rates = self.rotated(a - self.angle(v) * self.quarter_turned(v), -angle)
         return self.rotated(self.reduced.mass @ rates - self.apparent_forces(v, angle), angle)
 
     def accelerations(self, q: Floats, v: Floats, f: Floats) -> Floats:
-        """Accelerations under generalized forces f, all (n,): the inverse of `inertia_forces`."""
+        """Accelerations of one state under generalized forces f: the inverse of `inertia_forces`."""
         angle = self.angle(q)
         given = self.rotated(f, -angle) + self.apparent_forces(v, angle)
         rates: Floats = np.asarray(np.linalg.solve(self.reduced.mass, given), dtype=np.float64)

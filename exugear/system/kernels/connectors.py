@@ -212,10 +212,15 @@ def add_connector_forces(q: Floats, v: Floats, connectors: ConnectorArrays, f: F
 
 
 def connector_loads(q: Floats, v: Floats, connectors: ConnectorArrays) -> Floats:
-    """Force and moment (c, 6) that each connector takes from its second body, global axes, N and N m."""
-    places = _places(connectors, q.size)
+    """Force and moment (..., c, 6) that each connector takes from its second body, global axes, N and N m.
+
+    Parameters
+    ----------
+    q, v : (..., size) coordinates and velocities
+    """
+    places = _places(connectors, q.shape[-1])
     _, load, _ = _loads(_local(q, places), _local(v, places), connectors)
-    return load.reshape(-1, BODY_SIZE)
+    return load.reshape(*load.shape[:-2], BODY_SIZE)
 
 
 def loads_at_rest(q: Floats, connectors: ConnectorArrays) -> Floats:
