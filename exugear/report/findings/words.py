@@ -14,6 +14,7 @@ import numpy as np
 from exugear.gearbox.gearbox import Gearbox
 from exugear.results.spectra.run_spectra import element_words
 from exugear.results.spectra.waterfall import OrderLine
+from exugear.steady.findings import QUANTITY_NAMES
 from fe_ste.tools.display import without_round_off
 
 if TYPE_CHECKING:
@@ -55,11 +56,13 @@ class QuantityLabel:
 
 
 QUANTITIES = {
-    "error": QuantityLabel("Transmission error", "transmission error", "TE", "µm", 1e6),
-    "force": QuantityLabel("Bearing force", "bearing force", "force", "kN", 1e-3),
-    "acceleration": QuantityLabel("Acceleration at bearings", "acceleration at bearings", "accel.", "m/s²", 1.0),
-    "mount_acceleration": QuantityLabel("Acceleration at mounts", "acceleration at mounts", "mounts", "m/s²", 1.0),
-    "surface_velocity": QuantityLabel("Surface velocity", "surface velocity", "surface", "mm/s", 1e3),
+    "error": QuantityLabel("Transmission error", QUANTITY_NAMES["error"], "TE", "µm", 1e6),
+    "force": QuantityLabel("Bearing force", QUANTITY_NAMES["force"], "force", "kN", 1e-3),
+    "acceleration": QuantityLabel("Acceleration at bearings", QUANTITY_NAMES["acceleration"], "accel.", "m/s²", 1.0),
+    "mount_acceleration": QuantityLabel(
+        "Acceleration at mounts", QUANTITY_NAMES["mount_acceleration"], "mounts", "m/s²", 1.0
+    ),
+    "surface_velocity": QuantityLabel("Surface velocity", QUANTITY_NAMES["surface_velocity"], "surface", "mm/s", 1e3),
 }
 """Labels of the quantities of a ranking."""
 
