@@ -296,6 +296,7 @@ def test_two_tabs_and_another_editor_do_no_harm(view: EditView, browser: Any, ad
     number = PAIR.split("\n").index("modal_percent = 2.0") + 1
     assert f"They differ in line {number}." in other.text("#conflict-words")
     other.page.click("#keep-text")
+    other.page.wait_for_selector("#conflict", state="hidden")
     # The other text is not lost: it is one step of undo away.
     other.page.click("#undo")
     other.page.wait_for_selector(".cm-line >> text=modal_percent = 1.0")

@@ -156,8 +156,8 @@ function placeOfDifference(mine, other) {
 
 /** Go on with the text; the file is one step of undo away. */
 async function keepText() {
-  const mine = text();
   const content = await (await ask("file")).json();
+  const mine = text(); // with what was typed while the server answered
   Object.assign(file, { text: content.text, digest: content.digest });
   need("conflict").hidden = true;
   putText(editor, content.text);
