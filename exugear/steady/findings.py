@@ -40,7 +40,7 @@ NOTICED_NEIGHBOURS = 1e-2
 NOTICED_SHUTTLING = 0.3
 """Ratio of shuttling moment to transmission error excitation above which a warning is given."""
 FIRST_RANKS = 20
-"""Ranks that are to be true: a warning is given if one of these peaks is higher between the speeds."""
+"""Highest peaks of which a warning is given if one may be higher between the speeds, instead of a note."""
 QUANTITY_NAMES = {
     "error": "transmission error",
     "force": "bearing force",

@@ -146,3 +146,28 @@ def test_joints_of_tables_say_that_their_moments_are_unknown(grc: Gearbox) -> No
         match=": uneven load distribution along the face width adds moments",
     ):
         support_loads(assembly, {"support_force": np.zeros((1, len(grc.joints), 3))})
+
+
+def test_inertia_takes_the_power_that_kinetic_energy_gains_at_each_of_several_states(
+    grc: Gearbox, stiffness: dict[str, np.ndarray]
+) -> None:
+    """The energy of axially symmetric bodies in Rxyz angles, its change by central differences."""
+    assembly = assemble(grc, Choice("bushing"), stiffness)
+    inertia, rng = assembly.inertia, np.random.default_rng(7)
+    q, v, a = rng.normal(0.0, 0.3, (3, 4, assembly.size))
+
+    def energy(q: np.ndarray, v: np.ndarray) -> float:
+        total = 0.5 * (inertia.spin_inertia * v[inertia.spin] ** 2).sum()
+        for first, mass, transverse, axial in zip(*inertia[:4], strict=True):
+            tilt, (da, db, spin) = q[first + 4], v[first + 3 : first + 6]
+            across = (da * np.cos(tilt)) ** 2 + db**2
+            total += 0.5 * mass * (v[first : first + 3] ** 2).sum()
+            total += 0.5 * transverse * across + 0.5 * axial * (spin + da * np.sin(tilt)) ** 2
+        return float(total)
+
+    forces = assembly.inertia_forces(q, v, a)
+    h = 1e-5
+    for n, (place, rate, bend) in enumerate(zip(q, v, a, strict=True)):
+        gains = [energy(place + s * h * rate, rate + s * h * bend) for s in (1.0, -1.0)]
+        assert forces[n] @ rate == pytest.approx((gains[0] - gains[1]) / (2.0 * h), rel=1e-6)
+        np.testing.assert_allclose(forces[n], assembly.inertia_forces(place, rate, bend), rtol=1e-12, atol=1e-9)

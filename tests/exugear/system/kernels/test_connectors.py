@@ -73,6 +73,12 @@ def test_forces_loads_and_strains_are_those_of_plain_loops(connectors: Connector
         assert np.abs(loads[n] - load).max() < 1e-12 * np.abs(load).max()
 
 
+def test_loads_at_several_states_are_those_at_each(connectors: ConnectorArrays) -> None:
+    q, v = (np.array(values) for values in zip(*map(state, range(4)), strict=True))
+    each = np.array([connector_loads(*own, connectors) for own in zip(q, v, strict=True)])
+    assert np.abs(connector_loads(q, v, connectors) - each).max() < 1e-12 * np.abs(each).max()
+
+
 def test_tangents_are_the_derivatives_of_the_forces_of_chosen_connectors(connectors: ConnectorArrays) -> None:
     """Central differences of the same length: of the whole law against those of each connector's own coordinates."""
     q, _ = state(2)

@@ -119,6 +119,16 @@ def test_compiled_accelerations_are_those_of_the_plain_law(body: TurningBody) ->
     assert np.abs(found[4:-6] - np.concatenate(expected)).max() < 1e-10 * np.abs(found[4:-6]).max()
 
 
+def test_forces_of_several_states_are_those_of_each(body: TurningBody) -> None:
+    states = [at_random(body, angle, speed)[:2] for angle, speed in ((40.3, 7.0), (-7.1, -30.0), (0.2, 0.0))]
+    q, v = (np.array(values).T for values in zip(*states, strict=True))
+    a = np.random.default_rng(5).normal(0.0, 1.0, q.shape)
+    forces = np.transpose([body.forces(*state) for state in states])
+    inertia = np.transpose([body.inertia_forces(*state, own) for state, own in zip(states, a.T, strict=True)])
+    assert np.abs(body.forces(q, v) - forces).max() < 1e-9 * np.abs(forces).max()
+    assert np.abs(body.inertia_forces(q, v, a) - inertia).max() < 1e-9 * np.abs(inertia).max()
+
+
 def test_inertia_forces_invert_accelerations(body: TurningBody) -> None:
     q, v, f = at_random(body, 40.3, 7.0)
     assert body.inertia_forces(q, v, body.accelerations(q, v, f)) == pytest.approx(f, abs=1e-9 * np.abs(f).max())
