@@ -52,27 +52,27 @@ def validity_checks(context: Context, group: RunGroup) -> tuple[Finding, ...]:
     response = group.responses.get(group.main)
     if response is None:
         figures = run_figures(run)
-        verdicts = [*run_findings(run.attributes, figures.residual, dict(zip(MESH_TIMES, figures.times, strict=True)))]
+        findings = [*run_findings(run.attributes, figures.residual, dict(zip(MESH_TIMES, figures.times, strict=True)))]
         if not int(run.attributes["complete"]):
-            verdicts.append(Finding("warning", f"the run was aborted at {figure_text(figures.end)} s"))
+            findings.append(Finding("warning", f"the run was aborted at {figure_text(figures.end)} s"))
     else:
-        verdicts = [*response_findings(response)]
-    verdicts += _check_resonances(group)
+        findings = [*response_findings(response)]
+    findings += _check_resonances(group)
     text = f"damping is assumed ({damping_in_words(case.damping)}). Resonance amplitudes depend on it directly"
-    verdicts.append(Finding("warning", text))
+    findings.append(Finding("warning", text))
     sets = context.gearbox.inertia_sets
     if len(sets) > 1:
         text = f"one of {len(sets)} inertia sets ({', '.join(sets)}) is used; compare the others"
-        verdicts.append(Finding("warning", text))
-    verdicts += [Finding("warning", text) for text in excitation_warnings(context.gearbox)]
+        findings.append(Finding("warning", text))
+    findings += [Finding("warning", text) for text in excitation_warnings(context.gearbox)]
     rated = case.operation.rated_speed_rpm
     fastest = float(run.spectra.speed.max()) / RPM
     if rated is None:
-        verdicts.append(Finding("warning", "no rated speed; set rated_speed_rpm in [operation]"))
+        findings.append(Finding("warning", "no rated speed; set rated_speed_rpm in [operation]"))
     elif fastest > BEYOND_RATED * rated:
         text = f"the highest computed speed is {figure_text(fastest / rated, 2)} times the rated speed"
-        verdicts.append(Finding("warning", f"{text}; speeds outside the operating range are not ranked"))
-    return tuple(sorted(verdicts, key=lambda own: not own.passed))
+        findings.append(Finding("warning", f"{text}; speeds outside the operating range are not ranked"))
+    return tuple(sorted(findings, key=lambda own: not own.passed))
 
 
 def _check_resonances(group: RunGroup) -> list[Finding]:
@@ -81,16 +81,16 @@ def _check_resonances(group: RunGroup) -> list[Finding]:
         return []
     count = len(loudest)
     steady = sum(own.steady for own in loudest)
-    verdicts: list[Finding] = []
+    findings: list[Finding] = []
     if not group.responses:
         passed = steady == count
         found = _fraction(steady, count, passed)
-        verdicts.append(check_finding(passed, f"{found} are found with all window lengths"))
+        findings.append(check_finding(passed, f"{found} are found with all window lengths"))
     if group.runs[group.main].modes is None and not group.responses:
-        return [*verdicts, Finding("warning", "no modes computed; run exugear modes for mode shapes")]
+        return [*findings, Finding("warning", "no modes computed; run exugear modes for mode shapes")]
     matched = sum(bool(own.finding.mode_name) for own in loudest)
     passed = matched >= MATCHED * count
-    return [*verdicts, check_finding(passed, f"{_fraction(matched, count, passed)} are at the frequency of a mode")]
+    return [*findings, check_finding(passed, f"{_fraction(matched, count, passed)} are at the frequency of a mode")]
 
 
 def _fraction(number: int, count: int, passed: bool) -> str:

@@ -296,17 +296,19 @@ def _compared_groups(material: ReportData) -> list[dict[str, Any]]:
     content = []
     for group in material.groups:
         facts = facts_of(material.context, material.words, group, material.variations)
-        found = validity_checks(material.context, group)
-        verdicts = [replace(finding, text=material.words.labelled(finding.text)) for finding in found]
+        findings = [
+            replace(finding, text=material.words.labelled(finding.text))
+            for finding in validity_checks(material.context, group)
+        ]
         if group is material.groups[0]:
-            notes.findings.extend(verdicts)
-            notes.statements.extend(f"{verdict.line}." for verdict in verdicts)
+            notes.findings.extend(findings)
+            notes.statements.extend(f"{finding.line}." for finding in findings)
         if not group.responses:
             several = group_words(material.groups, group)
             notes.statements.append(f"{several}: Load: {_load_of(material, group)}.")
             notes.statements.extend(f"{several}: {fact.line}" for fact in facts)
             if group is not material.groups[0]:
-                notes.statements.extend(f"{several}: {verdict.line}." for verdict in verdicts)
+                notes.statements.extend(f"{several}: {finding.line}." for finding in findings)
         content.append(
             {
                 "name": group.name,
@@ -315,7 +317,7 @@ def _compared_groups(material: ReportData) -> list[dict[str, Any]]:
                     f"{material.input_words}. Levels: overall transmission error (TE), 0 dB = 1 µm."
                 ),
                 "facts": facts,
-                "verdicts": verdicts,
+                "findings": findings,
             }
         )
         for variant, comparison in group.comparisons.items():

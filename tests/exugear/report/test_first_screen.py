@@ -87,6 +87,27 @@ def test_a_higher_peak_outside_the_operating_range_does_not_lead(folder, told, t
     assert amplitude and float(amplitude[1]) > 0.1 * told["resonances"][0]["force_N"]
 
 
+@pytest.mark.validation
+def test_a_note_on_the_result_is_no_passed_check(folder, tmp_path, monkeypatch):
+    """Peaks that may be higher between the computed speeds are a warning within the first ranks, else a note."""
+
+    def planted(path: Path) -> Any:
+        higher = [{"quantity": "force", "rank": 40, "excess": 0.5}]
+        return load_response(path).assign_attrs(higher_between=json.dumps(higher))
+
+    shutil.copytree(folder, tmp_path / "planted")
+    monkeypatch.setattr("exugear.report.findings.context.load_response", planted)
+    monkeypatch.setattr("exugear.report.writer.model_variations", lambda *arguments: ())
+    report = write_report(tmp_path / "planted")
+    page = html.unescape(report.path.read_text(encoding="utf-8"))
+    lists = dict(re.findall(r'<ul class="findings" aria-label="([^"]*)">(.*?)</ul>', page, re.DOTALL))
+    noted = re.sub(r"<[^>]*>", "", lists["Notes"])
+    assert "Note: peaks of lower rank may be higher between the computed speeds" in noted
+    assert "peaks of lower rank" not in lists["Passed checks"] + lists["Warnings"]
+    assert "Passed: " not in noted and f"Notes ({noted.count('Note: ')})</summary>" in page
+    assert any(line.startswith("Note: peaks of lower rank") for line in report.statements)
+
+
 def rows_of(page: str, table: str) -> list[dict[str, str]]:
     """Cells of a table of the page by their label."""
     (body,) = re.findall(rf'<table id="{table}".*?</table>', page, re.DOTALL)
