@@ -198,10 +198,8 @@ def _highest_peaks(
     of_quantity: list[set[tuple[int, int]]] = []
     for quantity in quantities:
         size = quantity.sizes(amplitude[:, 1:]).max(axis=2)
-        peaks = peaks_of_lines(size)
-        of_quantity.append(set(peaks))
-        peaks = sorted((peak for peak in peaks if inside[peak[0]]), key=lambda peak: -size[peak])
-        chosen |= {peak for peak in peaks[:MOST_PEAKS] if size[peak] > 0.0}
+        of_quantity.append(set(peaks_of_lines(size)))
+        chosen |= set(quantity.peaks(size, inside[:, None])[:MOST_PEAKS])
     ordered = sorted(chosen)
     rises = np.array([[peak in peaks for peaks in of_quantity] for peak in ordered], dtype=bool)
     point, line = np.array(ordered, dtype=np.int64).reshape(-1, 2).T

@@ -14,6 +14,7 @@ from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.results.findings import Finding, check_finding
 from exugear.results.sound.over_speed import sound_over_speed
+from exugear.steady.mean_system.signals import RELATIVE_ROUND_OFF, ROUND_OFF, SIGNALS
 from exugear.steady.peaks import (
     STRAINED,
     bearing_swings,
@@ -48,8 +49,6 @@ QUANTITY_NAMES = {
     "mount_acceleration": "acceleration at mounts",
     "surface_velocity": "surface velocity",
 }
-LEAST_AMPLITUDE = 1e-12
-"""Amplitude of the overall transmission error below which a response is round-off, m."""
 SHOWN_BEARINGS = 4
 SHOWN_ORDERS = 3
 SHOWN_SPEEDS = 6
@@ -120,8 +119,17 @@ def speed_caveats(data: xr.Dataset) -> SpeedCaveats:
 
 
 def is_excited(data: xr.Dataset) -> bool:
-    """Whether anything vibrates: the mesh stiffness varies over the mesh cycle."""
-    return bool((data["amplitude"][:, 1:, 0] > LEAST_AMPLITUDE).any())
+    """Whether anything vibrates: the overall transmission error or, as under an unbalance, bearing forces alone."""
+    return _varies(data, "error") or _varies(data, "force")
+
+
+def _varies(data: xr.Dataset, quantity: str) -> bool:
+    """Return whether a quantity has orders above round-off."""
+    signal, _ = SIGNALS[quantity]
+    places = [n for n, name in enumerate(data["signal"].to_numpy()) if str(name).split(" ", maxsplit=1)[0] == signal]
+    amplitude = data["amplitude"].to_numpy()[:, :, places]
+    static = float(amplitude[:, 0].max(initial=0.0))
+    return bool((amplitude[:, 1:] > max(ROUND_OFF[quantity], RELATIVE_ROUND_OFF * static)).any())
 
 
 def _load_sharing(data: xr.Dataset) -> dict[str, float]:
@@ -266,11 +274,16 @@ def _passing(data: xr.Dataset) -> Iterator[Finding]:
 
 def _excitation(data: xr.Dataset) -> Iterator[Finding]:
     """Excitation by the meshes, and its truncation."""
-    if not is_excited(data):
-        text = f"no excitation: the mesh model {data.attrs['mesh_model']} has constant stiffness over the mesh cycle, "
-        # Displaced pins still load bearings at orders of the carrier.
-        still = "the overall transmission error does not vary" if _load_sharing(data) else "all amplitudes are zero"
-        yield Finding("warning", f"{text}and {still}; use --mesh-model line_of_action")
+    if not _varies(data, "error"):
+        # Displaced pins and unbalances still load bearings, at orders of their shafts.
+        others = bool(_load_sharing(data)) or is_excited(data)
+        text = f"no excitation{' by the meshes' if others else ''}: the mesh model {data.attrs['mesh_model']} has "
+        text += "constant stiffness over the mesh cycle, and "
+        text += "the overall transmission error does not vary" if others else "all amplitudes are zero"
+        turned = any(str(name).startswith("rotation of ") for name in data["base"].values)
+        if turned and not Variant.of(str(data.attrs["variant"])).has_bearings:
+            text += "; in this variant ideal joints take the forces of excitations and unbalances"
+        yield Finding("warning", f"{text}; use --mesh-model line_of_action")
         return
     harmonics = int(data.attrs["harmonics"])
     change = float(data.attrs["change_with_more"])

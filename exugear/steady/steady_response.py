@@ -649,6 +649,7 @@ def _fill(out: SolvedPoints, n: int, model: HarmonicBalanceModel, response: Resp
     out.mean_angles[n] = loads is not None and loads.at_mean_angles
     least = max(RESOLVED * exchanged_power(response), 1e-300)
     deflections = np.abs(response.deflection)
-    if loads is None and deflections[1:].max(initial=0.0) <= ROUND_OFF * deflections.max(initial=0.0):
+    nothing_loads = loads is None or not loads.motion[1:].any()
+    if nothing_loads and deflections[1:].max(initial=0.0) <= ROUND_OFF * deflections.max(initial=0.0):
         return  # nothing excites: powers of round-off do not balance
     out.energy_error[n] = (taken - given) / max(abs(taken), abs(given), least)

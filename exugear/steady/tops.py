@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from exugear.steady.crossings import COINCIDE, in_operation
-from exugear.steady.harmonics.branches import NEIGHBOURS, peaks_of_lines, predicted_tops
+from exugear.steady.harmonics.branches import NEIGHBOURS, predicted_tops
 from exugear.steady.mean_system.signals import SURFACE_VELOCITY, Quantity
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, SingleComplexes
 
@@ -123,7 +123,7 @@ def missed_tops(curves: ResponseCurves, known: KnownTops | None = None, count: i
     for quantity in curves.quantities:
         sizes = curves.sizes(quantity)
         highest = sizes.max(axis=2)
-        peaks = sorted(peaks_of_lines(highest, LEAST_STAND), key=lambda peak: -highest[peak])
+        peaks = quantity.peaks(highest, prominence=LEAST_STAND)
         predicted = curves.tops(quantity, sizes, _first(peaks, PREDICTED, inside), known)
         by_height = sorted(predicted, key=lambda peak: -predicted[peak][1])
         for point, line in _first(by_height, count, inside):
@@ -153,12 +153,10 @@ def higher_between(curves: ResponseCurves, known: KnownTops) -> tuple[HigherBetw
     These are estimates: the response was not computed at the tops.
     """
     found = []
-    inside = curves.inside
     for quantity in curves.quantities if len(curves.speed) >= NEIGHBOURS else ():
         sizes = curves.sizes(quantity)
         highest = sizes.max(axis=2)
-        peaks = [peak for peak in peaks_of_lines(highest) if inside[peak[0]]]
-        ranked = sorted(peaks, key=lambda peak: -highest[peak])[:PREDICTED]
+        ranked = quantity.peaks(highest, curves.inside[:, None])[:PREDICTED]
         tops = curves.tops(quantity, sizes, ranked, known)
         excess = np.array([tops[peak][1] / highest[peak] - 1.0 if peak in tops else 0.0 for peak in ranked])
         if (noticed := np.flatnonzero(excess > NOTICED)).size:
@@ -185,13 +183,11 @@ def missed_flanks(curves: ResponseCurves) -> Floats:
     Near the top A of a resonance the amplitude at a distance d is A / sqrt(1 + (d / w)^2). The first point below A / 2
     on a flank gives w. Other modes may add to that point, and w is too large; the next call then comes closer.
     """
-    inside = curves.inside
     speed = curves.speed
     more: list[float] = []
     for quantity in curves.quantities:
         sizes = curves.sizes(quantity).max(axis=2)
-        peaks = [peak for peak in peaks_of_lines(sizes) if inside[peak[0]]]
-        for point, line in sorted(peaks, key=lambda peak: -sizes[peak])[:DRAWN]:
+        for point, line in quantity.peaks(sizes, curves.inside[:, None])[:DRAWN]:
             if curves.smooth[_around(point, len(speed))].all():
                 for side in (slice(point, None), slice(point, None, -1)):
                     more += _on_flank(speed[side], sizes[side, line])

@@ -24,7 +24,8 @@ from exugear.results.findings import Finding
 from exugear.results.folder import finite_or_none
 from exugear.results.sound.over_speed import sound_over_speed
 from exugear.results.sound.radiated_power import radiating_names
-from exugear.steady.findings import LEAST_AMPLITUDE, is_excited, response_findings, shuttling_findings
+from exugear.steady.findings import is_excited, response_findings, shuttling_findings
+from exugear.steady.mean_system.signals import ROUND_OFF
 from exugear.steady.peaks import bearing_swings, peaks, pulls
 from exugear.steady.settings import (
     USUAL_COUNT,
@@ -185,7 +186,7 @@ def summarise(
                 "amplitude_m": peak.amplitude,
             }
             for peak in peaks(data)
-            if peak.amplitude > LEAST_AMPLITUDE
+            if peak.amplitude > ROUND_OFF["error"]
         ],
         "sources_of_overall_dte": json.loads(data.attrs["contributions"]) if project.gearbox.varying_loads else [],
         "sound": None if sound is None else sound.inside(ranking.speeds).summary(),

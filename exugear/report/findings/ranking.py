@@ -21,7 +21,7 @@ from exugear.results.findings import Finding
 from exugear.results.spectra.line_spectra import LineSpectra, line_spectra
 from exugear.results.spectra.waterfall import OrderLine
 from exugear.steady.harmonics.branches import standing_peaks
-from exugear.steady.mean_system.signals import Quantity, vector_peak
+from exugear.steady.mean_system.signals import ROUND_OFF, Quantity, vector_peak
 from exugear.steady.peaks import SWEEP_SHIFT
 from exugear.steady.settings import METHODS
 from exugear.steady.steady_file import complex_amplitudes, response_quantities, settings_of
@@ -35,16 +35,6 @@ SAME_SPEED_TOLERANCE = 0.01
 """Relative speed difference within which peaks of one order in several quantities are one resonance."""
 AROUND = (0.8, 1.15)
 """Speeds drawn first, as factors of the ends of the operating range."""
-MIN_RELATIVE_PEAK = 1e-9
-"""Peaks below this fraction of the largest peak of their quantity are round-off."""
-MIN_EXCITED = {
-    "error": 1e-12,
-    "force": 1e-6,
-    "acceleration": 1e-9,
-    "mount_acceleration": 1e-9,
-    "surface_velocity": 1e-12,
-}
-"""Amplitudes below which nothing is excited, in the units of the quantities."""
 SOUND = "surface_velocity"
 """Quantity whose square is the sound power."""
 UNIT_KEYS = {
@@ -237,10 +227,10 @@ def ranking_of(data: xr.Dataset, speeds: tuple[float, float] | None = None, want
     sizes = {quantity.name: quantity.sizes(amplitude) for quantity in quantities}
     peaks = {}
     for quantity in quantities:
-        counted = np.repeat(inside[:, None], amplitude.shape[1], axis=1)
+        counted = inside[:, None]
         if quantity.name == SOUND:  # above the band of the housing no peak counts
-            counted &= np.isfinite(data["sound_power"].to_numpy()[:, 1:])
-        peaks[quantity.name] = _peaks(quantity, sizes[quantity.name].max(axis=2), counted)
+            counted = counted & np.isfinite(data["sound_power"].to_numpy()[:, 1:])
+        peaks[quantity.name] = quantity.peaks(sizes[quantity.name].max(axis=2), counted)
     places = [
         (quantity.name != first, place, number, quantity.name, point, line)
         for number, quantity in enumerate(quantities)
@@ -426,16 +416,6 @@ def ranking_of_errors(
     return Ranking(found, (low, high), whole, SHAFTS)
 
 
-def _peaks(quantity: Quantity, values: Floats, counted: Booleans) -> list[tuple[int, int]]:
-    """Return point and order indices of the peaks of a quantity (points, orders) that count, the highest first."""
-    found = [
-        (int(point), line) for line, own in enumerate(values.T) for point in standing_peaks(own) if counted[point, line]
-    ]
-    largest = max((values[peak] for peak in found), default=0.0)
-    least = max(MIN_RELATIVE_PEAK * largest, MIN_EXCITED[quantity.name])
-    return sorted((peak for peak in found if values[peak] > least), key=lambda peak: -values[peak])
-
-
 def _is_same_resonance(group: Mapping[str, tuple[int, int, int]], speed: Floats, point: int) -> bool:
     """Return whether a peak belongs to a resonance of the same order: both are at practically the same speed."""
     _, first, _ = next(iter(group.values()))
@@ -444,8 +424,6 @@ def _is_same_resonance(group: Mapping[str, tuple[int, int, int]], speed: Floats,
 
 # Levels at constant speed: a fast run-up underestimates resonances that have no time to build up
 
-MIN_AMPLITUDE = 1e-12
-"""Smallest amplitude (m) for the conversion to levels."""
 TOP = 1.1
 """Highest drawn frequency over the highest mesh frequency at the highest speed."""
 DRAWN = 10
@@ -518,7 +496,7 @@ def constant_speed_of(response: xr.Dataset) -> ConstantSpeed:
     rising = np.argsort(speed, kind="stable")
     signals = [str(name) for name in response["signal"].to_numpy()]
     amplitude = response["amplitude"].to_numpy()[rising, :, signals.index("overall_dte")].astype(np.float64)
-    level = 20.0 * np.log10(np.maximum(amplitude, MIN_AMPLITUDE) / 1e-6)
+    level = 20.0 * np.log10(np.maximum(amplitude, ROUND_OFF["error"]) / 1e-6)
     return ConstantSpeed(speed[rising], response["order"].to_numpy(), level)
 
 

@@ -10,9 +10,10 @@ import numpy as np
 
 from exugear.report.findings.groups import RankedResonance, RunGroup, is_peak_of
 from exugear.report.findings.headline import Headline, headline_of_response
-from exugear.report.findings.ranking import MIN_AMPLITUDE, Resonance, ranking_of
+from exugear.report.findings.ranking import Resonance, ranking_of
 from exugear.results.spectra.waterfall import OrderLine
 from exugear.steady.findings import speed_caveats
+from exugear.steady.mean_system.signals import ROUND_OFF
 
 MOST_INSIDE, MOST_OUTSIDE = 40, 20
 """Maximum number of listed resonances in the operating range and at other speeds."""
@@ -55,7 +56,7 @@ def listed_resonance(
         OrderLine(own.line.replace(" x ", " × "), own.order),
         abs(own.speed),
         own.frequency,
-        20.0 * math.log10(max(own.amplitudes["error"].amplitude, MIN_AMPLITUDE) / 1e-6),
+        20.0 * math.log10(max(own.amplitudes["error"].amplitude, ROUND_OFF["error"]) / 1e-6),
         inside,
         None if found is None else found.index,
         own,

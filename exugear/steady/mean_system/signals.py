@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from exugear.steady.harmonics.branches import STANDS, peaks_of_lines
 from exugear.steady.mean_system.mean_system import RATE_STEP, MeanSystem, place_step
 from exugear.steady.mean_system.mesh_waves import MeshWaves, wave_name
 from exugear.steady.mean_system.planet_sets import PlanetSet
@@ -30,7 +31,7 @@ from exugear.system.kernels.coordinates import TILT
 from exugear.system.modes import overall_row
 from exugear.system.signals import coupling_rows, turning_bodies
 from exugear.system.system import Assembly
-from fe_ste.tools.arrays import Complexes, Floats, Integers, SingleComplexes
+from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers, SingleComplexes
 
 AXES = ("x", "y", "z")
 PLANET_AXES = ("radial", "tangential", "z")
@@ -307,6 +308,23 @@ class Quantity:
         """Return the amplitudes (..., places) from the complex amplitudes (..., signals) of all signals."""
         return np.stack([self.size(self.components(amplitude, n), n) for n in range(len(self.places))], axis=-1)
 
+    def peaks(
+        self, sizes: Floats, counted: Booleans | bool = True, prominence: float = STANDS
+    ) -> list[tuple[int, int]]:
+        """Return point and line of the peaks over speed of amplitudes, the highest first, without those of round-off.
+
+        Parameters
+        ----------
+        sizes : (points, lines) amplitudes
+        counted : (points, lines), or of a shape that fits, which peaks count
+        prominence : see `exugear.steady.harmonics.branches.standing_peaks`
+        """
+        counts = np.broadcast_to(counted, sizes.shape)
+        found = [peak for peak in peaks_of_lines(sizes, prominence) if counts[peak]]
+        found.sort(key=lambda peak: -sizes[peak])
+        least = max(ROUND_OFF[self.name], RELATIVE_ROUND_OFF * sizes[found[0]]) if found else 0.0
+        return [peak for peak in found if sizes[peak] > least]
+
 
 SIGNALS = {
     "error": ("overall_dte", "m"),
@@ -316,6 +334,17 @@ SIGNALS = {
     "surface_velocity": ("surface_velocity", "m/s"),
 }
 """Signals of each quantity and their units."""
+ROUND_OFF = {
+    "error": 1e-12,
+    "force": 1e-6,
+    "acceleration": 1e-9,
+    "mount_acceleration": 1e-9,
+    "surface_velocity": 1e-12,
+}
+"""Amplitudes up to which nothing vibrates, in the units of the quantities."""
+RELATIVE_ROUND_OFF = 1e-6
+"""Share of the highest peak of a quantity up to which a peak may come from the accuracy of the solution: the harmonic
+balance of forces in time is solved to 1e-8 of the static deflections."""
 
 
 def quantities_of(names: Sequence[str], mounts: Collection[str]) -> tuple[Quantity, ...]:

@@ -131,6 +131,25 @@ def test_lines_are_named_by_shaft_and_mesh_and_are_no_ratio_of_stages():
     assert float(np.abs(data["energy_error"]).max()) < 1e-6
 
 
+def test_lines_of_round_off_ask_for_no_speeds():
+    """Constant stiffness has no mesh orders: the method `nonlinear` leaves 1e-13 of the static deflection at them.
+
+    Of the template of a pair with run-out, 593 speeds had been added for their peaks.
+    """
+    gearbox = Gearbox.from_dict(tomllib.loads(SPUR_CASE) | {"deviations": {"one": RUN_OUT}})
+    assembly = assemble(gearbox, Choice("bushing"), {"spur": np.array([3e8])})
+    found = {
+        method: response_of(assembly, SteadySettings(SpeedRange(50.0, 150.0, 24), method, harmonics=3))
+        for method in ("parametric", "nonlinear")
+    }
+    speeds = {method: response.solved.speed for method, response in found.items()}
+    np.testing.assert_allclose(speeds["nonlinear"], speeds["parametric"], rtol=1e-6)
+    assert found["nonlinear"].higher_between == ()
+    both = [np.abs(response.solved.amplitude[:, :, 0]) for response in found.values()]
+    assert both[0].max() > 1e-6
+    np.testing.assert_allclose(both[1], both[0], atol=1e-6 * both[0].max())
+
+
 @pytest.mark.validation
 @pytest.mark.parametrize("deviations", [{"one": RUN_OUT}, BOTH], ids=["run-out", "pitch"])
 def test_deviations_on_curves_evaluated_in_time_stay_on_their_steady_state(deviations):

@@ -15,7 +15,7 @@ from exugear.steady.balance.response import (
 )
 from exugear.steady.campbell import modes_over_speed
 from exugear.steady.crossings import Mode, crossings, improved, with_crossings
-from exugear.steady.findings import response_findings
+from exugear.steady.findings import is_excited, response_findings
 from exugear.steady.point_solver import harmonic_balance_model
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import to_dataset
@@ -119,6 +119,33 @@ def test_powers_of_round_off_are_no_error_of_the_energy_balance(method):
     data = to_dataset(response_of(assembly, SteadySettings(SpeedRange(1.0, 6.0, 9), method, at_resonances=False)))
     assert not data["energy_error"].any()
     assert "Warning" not in " ".join(own.line for own in response_findings(data) if "energy" in own.text)
+
+
+def test_an_unbalance_on_ideal_joints_excites_nothing_and_the_result_says_why():
+    content = gear_trains.wind()
+    body = content["overall"]["input"]
+    content["excitations"] = {"balance": {"body": body, "z_mm": 0.0, "unbalance_g_mm": 300.0}}
+    gearbox = Gearbox.from_dict(content)
+    assembly = assemble(gearbox, Choice("rigid"), dict.fromkeys(gearbox.pairs, np.array([4e8])))
+    settings = SteadySettings(SpeedRange(1.0, 6.0, 9), "nonlinear", at_resonances=False)
+    data = to_dataset(response_of(assembly, settings))
+    assert not data["energy_error"].any()
+    (said,) = [own.text for own in response_findings(data) if own.text.startswith("no excitation")]
+    assert "ideal joints take the forces of excitations" in said
+
+
+def test_an_unbalance_that_loads_bearings_alone_is_an_excitation():
+    """Three planets share what a sun does that moves aside: the transmission error does not vary, its bearings do."""
+    content = gear_trains.planetary("ring")
+    content["excitations"] = {"balance": {"body": "sun", "z_mm": 0.0, "unbalance_g_mm": 300.0}}
+    gearbox = Gearbox.from_dict(content)
+    assembly = assemble(gearbox, Choice("bushing"), dict.fromkeys(gearbox.pairs, np.array([4e8])))
+    for method in ("parametric", "nonlinear"):
+        settings = SteadySettings(SpeedRange(20.0, 60.0, 9), method, at_resonances=False)
+        data = to_dataset(response_of(assembly, settings))
+        assert is_excited(data)
+        (said,) = [own.text for own in response_findings(data) if own.text.startswith("no excitation")]
+        assert "no excitation by the meshes" in said and "the overall transmission error does not vary" in said
 
 
 def test_an_energy_balance_is_judged_in_both_senses(grc, stiffness):
