@@ -231,9 +231,8 @@ def _models(data: xr.Dataset) -> Iterator[Finding]:
     if swings := bearing_swings(data):
         loads = [f"{own.name} {_percent(own.share)} at {_rpm(own.speed)}" for own in swings[:SHOWN_BEARINGS]]
         more = f"; and {len(swings) - SHOWN_BEARINGS} more" if len(swings) > SHOWN_BEARINGS else ""
-        text = (
-            f"dynamic load of bearings over {100.0 * STRAINED:.0f} % of their static load ({'; '.join(loads)}{more}): "
-        )
+        text = f"dynamic load of bearings over {100.0 * STRAINED:.0f} % of their static load or preload "
+        text += f"({'; '.join(loads)}{more}): "
         # Rolling elements of planets that are not alike are evaluated by runs alone.
         way = "exugear run" if varying_carriers(data) else "--method nonlinear"
         text += f'outside the linear range, peaks there are too high; set model = "iso16281" and use {way}'

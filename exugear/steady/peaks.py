@@ -275,24 +275,33 @@ def tensile_fractions(data: xr.Dataset) -> dict[str, Floats]:
 
 
 def bearing_swings(data: xr.Dataset) -> tuple[Excess, ...]:
-    """Return linear bearings whose vibration reaches `STRAINED` of the static load or more, the largest ratio first.
+    """Return linear bearings whose vibration reaches `STRAINED` of their load or more, the largest ratio first.
 
     They are outside their linear range, and unloaded from a ratio of 1 on. The orders of a speed are added as if in
-    phase, along the static load. Planet bearings, whose load rotates in fixed axes, are not checked.
+    phase. Planet bearings, whose load rotates in fixed axes, are not checked.
     """
     ratios = dynamic_load_ratios(data)
     return _excesses(data, {name: np.where(own >= STRAINED, own, 0.0) for name, own in ratios.items()})
 
 
 def dynamic_load_ratios(data: xr.Dataset) -> dict[str, Floats]:
-    """Return dynamic over static load at each speed (n,) of the bearings that `bearing_swings` checks."""
+    """Return dynamic over static load at each speed (n,) of the bearings that `bearing_swings` checks.
+
+    Of a bearing whose preload exceeds its static load it is the ratio to the preload.
+    """
     names = [str(name) for name in data["signal"].to_numpy()]
+    preloads = json.loads(data.attrs["bearing_preloads"])
     ratios = {}
     for bearing, load in json.loads(data.attrs["bearing_static_loads"]).items():
         signals = [f"support_force {bearing} {axis}" for axis in "xyz"]
         if set(signals) <= set(names):
             static = np.array(load)
-            # The largest vibration is along the static load, over which it counts.
+            size = float(np.linalg.norm(static))
             force = _amplitudes(data.isel(line=slice(1, None)), [names.index(name) for name in signals])
-            ratios[bearing] = np.nan_to_num(np.abs(force @ static).sum(axis=1)) / (static @ static)
+            if preloads[bearing] > size:
+                swing = np.linalg.norm(force, axis=2) / preloads[bearing]
+            else:
+                # The largest vibration is along the static load, over which it counts.
+                swing = np.abs(force @ static) / size**2
+            ratios[bearing] = np.nan_to_num(swing.sum(axis=1))
     return ratios

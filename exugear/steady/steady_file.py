@@ -29,6 +29,7 @@ from exugear.steady.mean_system.signals import (
 from exugear.steady.peaks import line_name
 from exugear.steady.settings import SpeedRange, SteadySettings, usual_speeds
 from exugear.steady.steady_response import SolvedPoints, SteadyResponse, response_of
+from exugear.system.bearings.duty import OperatingPoint
 from exugear.system.bodies.elastic_body import ElasticBody
 from exugear.system.build import assemble
 from exugear.system.statics import meshes_near_unconverged
@@ -146,6 +147,7 @@ def _attributes(response: SteadyResponse) -> dict[str, Any]:
     assembly = response.assembly
     # A mesh frequency is a multiple of its shafts' rotation by definition.
     unrelated = len(response.base_names) - response.shafts
+    linear = _linear_bearings(assembly)
     return {
         "gearbox": assembly.gearbox.name,
         "variant": str(assembly.variant),
@@ -157,7 +159,8 @@ def _attributes(response: SteadyResponse) -> dict[str, Any]:
         "method_version": STEADY,
         "housing_factor": assembly.housing_factor,
         "bearing_laws": assembly.bearing_laws,
-        "bearing_static_loads": json.dumps(_static_loads(assembly)),
+        "bearing_static_loads": json.dumps({name: point.load[:3].tolist() for name, point in linear.items()}),
+        "bearing_preloads": json.dumps({name: point.preload for name, point in linear.items()}),
         "mesh_contact": assembly.contacts.description,
         "bearings_in_time": ", ".join(response.bearing_names),
         "growth_rate": response.growth_rate,
@@ -186,10 +189,10 @@ def _attributes(response: SteadyResponse) -> dict[str, Any]:
     }
 
 
-def _static_loads(assembly: Assembly) -> dict[str, list[float]]:
-    """Force (N) on each bearing that is linear about its static load, where this stands still and is one."""
+def _linear_bearings(assembly: Assembly) -> dict[str, OperatingPoint]:
+    """Operating points of the bearings that are linear about their static load, where this stands still and is one."""
     return {
-        point.bearing.name: [float(value) for value in point.load[:3]]
+        point.bearing.name: point
         for point in assembly.operating_points
         if point is not None
         and point.bearing.model != "iso16281"

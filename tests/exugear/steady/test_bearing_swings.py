@@ -11,10 +11,12 @@ import xarray as xr
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.templates.kinds import template
 from exugear.steady.peaks import STRAINED, bearing_swings
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import to_dataset
 from exugear.steady.steady_response import response_of
+from exugear.system.bearings.rolling.contact import bearing_load, row_contacts, tangent_stiffness
 from exugear.system.build import assemble
 
 from ..cases.bearing import BEARING_CASE, NON_LINEAR
@@ -23,7 +25,7 @@ LINEAR = Gearbox.from_dict(tomllib.loads(BEARING_CASE))
 STATIC = np.array([300.0, -400.0, 0.0])
 
 
-def response(along: list[float], across: float = 0.0) -> xr.Dataset:
+def response(along: list[float], across: float = 0.0, preload: float = 0.0) -> xr.Dataset:
     """A bearing with one line along its static load at each speed, and one across it."""
     force = np.zeros((len(along), 3, 3), dtype=complex)
     force[:, 1] = 1j * np.outer(along, STATIC / np.linalg.norm(STATIC))
@@ -35,7 +37,10 @@ def response(along: list[float], across: float = 0.0) -> xr.Dataset:
             "phase": (("point", "line", "signal"), np.angle(force)),
         },
         {"signal": [f"support_force left {axis}" for axis in "xyz"]},
-        {"bearing_static_loads": json.dumps({"left": STATIC.tolist(), "planets": [1.0, 0.0, 0.0]})},
+        {
+            "bearing_static_loads": json.dumps({"left": STATIC.tolist(), "planets": [1.0, 0.0, 0.0]}),
+            "bearing_preloads": json.dumps({"left": preload, "planets": 0.0}),
+        },
     )
 
 
@@ -47,6 +52,37 @@ def test_the_share_is_that_of_the_load_along_its_own_direction() -> None:
 
 def test_small_swings_are_not_told() -> None:
     assert bearing_swings(response([0.99 * STRAINED * 500.0], across=900.0)) == ()
+
+
+def test_a_preload_above_the_static_load_counts_in_its_place_and_in_all_directions() -> None:
+    (swing,) = bearing_swings(response([500.0, 100.0], across=500.0, preload=2000.0))
+    assert (swing.name, swing.count, swing.speed) == ("left", 2, 10.0)
+    assert swing.share == pytest.approx(0.5)
+    assert bearing_swings(response([500.0], across=90.0, preload=2000.0)) == ()
+    (swing,) = bearing_swings(response([250.0], across=900.0, preload=499.0))
+    assert swing.share == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("kind", ["planetary", "wind"])
+def test_a_preloaded_pair_is_linear_up_to_a_third_of_its_preload(kind: str) -> None:
+    """Tangents beside the rows, along each axis and against it: within 3 % at 30 % of the preload."""
+    gearbox = Gearbox.from_dict(tomllib.loads(template(kind)))
+    assembly = assemble(gearbox, Choice("bushing"), dict.fromkeys(gearbox.pairs, np.array([4e8])))
+    preloaded = [point for point in assembly.operating_points if point is not None and point.preload > 0.0]
+    assert preloaded
+    for point in preloaded:
+        contacts = row_contacts(point.rows, point.first_roller_angle)
+        tangent = tangent_stiffness(contacts, point.displacement)[:3, :3]
+        scale = np.linalg.norm(point.load[:3])
+        assert point.preload > 0.5 * scale
+        for direction in (*np.eye(3), *-np.eye(3)):
+            force = STRAINED * point.preload * direction
+            moved = np.zeros(6)
+            for _ in range(30):  # Newton's method with the tangent at the operating point
+                missing = point.load[:3] + force - bearing_load(contacts, point.displacement + moved)[:3]
+                moved[:3] += np.linalg.solve(tangent, missing)
+            assert np.linalg.norm(missing) < 1e-6 * point.preload
+            assert moved[:3] @ direction == pytest.approx(np.linalg.solve(tangent, force) @ direction, rel=0.03)
 
 
 def height(gearbox: Gearbox, share: float, level: str) -> tuple[float, xr.Dataset]:
