@@ -220,10 +220,6 @@ def _rib_contact(section: CatalogueSection) -> Estimate | None:
     return _scaled("rib_contact_mm", dimensions.RIB_CONTACT, _given(section, "element_diameter_mm"), "mm")
 
 
-def _osculation(section: CatalogueSection) -> Estimate:
-    return _scaled("osculation", dimensions.OSCULATION, 1.0, "")
-
-
 def _row_distance(section: CatalogueSection) -> Estimate | None:
     if section.arrangement != "single":
         distance = dimensions.PAIR_DISTANCE
@@ -261,7 +257,7 @@ _ESTIMATED: Mapping[str, Callable[[CatalogueSection], Estimate | None]] = {
     "contact_angle_deg": _contact_angle,
     "inner_groove_ratio": _groove("inner_groove_ratio"),
     "outer_groove_ratio": _groove("outer_groove_ratio"),
-    "osculation": _osculation,
+    "osculation": lambda section: _scaled("osculation", dimensions.OSCULATION, 1.0, ""),
     "row_distance_mm": _row_distance,
     "radial_clearance_mm": _radial_clearance,
     "axial_preload_um": _axial_preload,
