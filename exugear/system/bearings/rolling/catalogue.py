@@ -93,7 +93,13 @@ def _rows_of(section: CatalogueSection, stated: frozenset[str]) -> tuple[Rolling
     for estimate in estimates(section):
         full = with_estimate(full, estimate, estimate.value)
     row = _ball_row(full) if full.type.endswith("ball") else _roller_row(full)
-    return *_placed(full, row), *_ribs(full, row)
+    rows = _placed(full, row)
+    if full.ribs != "none" and isinstance(row, RollerRow):
+        # Ribs of cylindrical rollers are rows of their own, first those that hold the inner ring against +z.
+        length = si(full, "rib_contact_mm")
+        senses = {"+z": (1,), "-z": (-1,), "both": (1, -1)}[full.ribs]
+        rows += tuple(rib_row(row, sense, length) for sense in senses)
+    return rows
 
 
 def estimates(section: CatalogueSection) -> tuple[Estimate, ...]:
@@ -358,15 +364,6 @@ def _placed(section: CatalogueSection, row: RollerRow | BallRow) -> tuple[Rollin
         return moved(row, -angle, -place), moved(row, angle, place)
     distance = si(section, "row_distance_mm") if rows > 1 else 0.0
     return tuple(moved(row, signed, (number - 0.5 * (rows - 1)) * distance) for number in range(rows))
-
-
-def _ribs(section: CatalogueSection, row: RollerRow | BallRow) -> tuple[RollerRow, ...]:
-    """Ribs of cylindrical rollers as rows of their own, first those that hold the inner ring against +z."""
-    if section.ribs == "none" or not isinstance(row, RollerRow):
-        return ()
-    length = si(section, "rib_contact_mm")
-    senses = {"+z": (1,), "-z": (-1,), "both": (1, -1)}[section.ribs]
-    return tuple(rib_row(row, sense, length) for sense in senses)
 
 
 # Catalogue load ratings, and the largest ratio of estimates to them
