@@ -70,7 +70,10 @@ def rating_outcome(sheet: RatingSheet, case: str, name: str) -> Outcome:
     """Return safety factors of all flanks, all factors by mesh, assumptions and neglected effects."""
     flanks = sorted(sheet.flanks, key=lambda flank: _value("S_H", flank))
     title = f"{sheet.edition}, method B; {sheet.load}"
-    smallest = ", ".join(_smallest(flanks, symbol) for symbol in ("S_H", "S_F") if flanks)
+    smallest = []
+    for symbol in ("S_H", "S_F") if flanks else ():
+        least = min(flanks, key=partial(_value, symbol))
+        smallest.append(f"{symbol} {_value(symbol, least):.2f} ({least.gear} {least.flank}, {least.family})")
     meshes: dict[tuple[str, int], list[FlankSheet]] = {}
     remarks: dict[str, None] = {}
     for flank in sheet.flanks:
@@ -86,7 +89,7 @@ def rating_outcome(sheet: RatingSheet, case: str, name: str) -> Outcome:
         for (family, sense), own in meshes.items()
     ]
     return Outcome(
-        verdict=f"Smallest {smallest}" if flanks else "No loaded flanks",
+        verdict=f"Smallest {', '.join(smallest)}" if flanks else "No loaded flanks",
         summary={"case": case, "name": name, "rating": sheet.summary()},
         tables=[Table(title, flanks, FLANKS, FLANK_LEGEND, noun="flanks"), *factors],
         findings=[
@@ -95,12 +98,6 @@ def rating_outcome(sheet: RatingSheet, case: str, name: str) -> Outcome:
         ],
         failure=failure_text("safety factors below the required minimum:", sheet.shortfalls),
     )
-
-
-def _smallest(flanks: list[FlankSheet], symbol: str) -> str:
-    """Return the smallest safety factor of all flanks, and the gear that has it."""
-    least = min(flanks, key=lambda flank: _value(symbol, flank))
-    return f"{symbol} {_value(symbol, least):.2f} ({least.gear} {least.flank}, {least.family})"
 
 
 def _rows(flanks: list[FlankSheet], other_edition: str) -> Iterator[tuple[str, str, str]]:

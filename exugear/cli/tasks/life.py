@@ -151,7 +151,8 @@ def _parts(found: Mapping[str, Any]) -> list[dict[str, Any]]:
 def life_tables(found: Mapping[str, Any]) -> list[Table]:
     """Return the tables of all parts, and those of flanks, roots and bearings."""
     title = "Tooth flanks: largest contact stress, safety against pitting"
-    smallest = []  # of the gears, because the parts with the largest damage may all be bearings
+    # The legend names the gears, because the parts with the largest damage may all be bearings.
+    smallest = []
     for symbol, key in (("S_H", "contact_safety"), ("S_F", "root_safety")):
         rated = [flank for flank in found["flanks"] if math.isfinite(_number(flank.get(key, math.nan)))]
         if rated:

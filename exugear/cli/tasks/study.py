@@ -79,6 +79,13 @@ def study(
         findings.append(Finding("warning", text))
     elif read.tolerances is not None:
         findings += [Finding("note", f"{name}: {result.dataset[name].attrs['long_name']}") for name in _judged(read)]
+    failures = [_beyond(read, result)]
+    if summary["failed"]:
+        line = f"{summary['failed']} of {summary['points']} points failed; errors: {folder}; use --retry-failed to "
+        failures.append(failure_text(f"{line}recompute them:", [f"- {error}" for error in summary["errors"]]))
+    elif summary["missing"] and summary["file"] is not None:
+        missing = f"{summary['missing']} of {summary['points']} points are missing"
+        failures.append(f"{missing}; run the study, or the unfinished shards")
     finished = f"{summary['finished']} of {summary['points']} points finished"
     Outcome(
         verdict=f"{read.file.name}: {finished}, {summary['computed']} computed now",
@@ -86,19 +93,8 @@ def study(
         tables=_tables(read, result.dataset),
         findings=findings,
         path=folder if result.path is None else f"{result.path}, pictures",
-        failure="\n".join(filter(None, [_beyond(read, result), _failed(folder, summary)])),
+        failure="\n".join(filter(None, failures)),
     ).show(as_json, whole)
-
-
-def _failed(folder: Path, summary: dict[str, Any]) -> str:
-    """Return how many points failed or are missing; empty if none."""
-    if summary["failed"]:
-        line = f"{summary['failed']} of {summary['points']} points failed; errors: {folder}; use --retry-failed to "
-        return failure_text(f"{line}recompute them:", [f"- {error}" for error in summary["errors"]])
-    if summary["missing"] and summary["file"] is not None:
-        missing = f"{summary['missing']} of {summary['points']} points are missing"
-        return f"{missing}; run the study, or the unfinished shards"
-    return ""
 
 
 def shard_of_options(text: str | None, merge: bool) -> Shard:
