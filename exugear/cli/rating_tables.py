@@ -70,17 +70,26 @@ def rating_outcome(sheet: RatingSheet, case: str, name: str) -> Outcome:
     """Return safety factors of all flanks, all factors by mesh, assumptions and neglected effects."""
     flanks = sorted(sheet.flanks, key=lambda flank: _value("S_H", flank))
     title = f"{sheet.edition}, method B; {sheet.load}"
-    smallest = ", ".join(_smallest(flanks, symbol) for symbol in ("S_H", "S_F") if flanks)
+    smallest = []
+    for symbol in ("S_H", "S_F") if flanks else ():
+        least = min(flanks, key=partial(_value, symbol))
+        smallest.append(f"{symbol} {_value(symbol, least):.2f} ({least.gear} {least.flank}, {least.family})")
+    meshes: dict[tuple[str, int], list[FlankSheet]] = {}
     remarks: dict[str, None] = {}
     for flank in sheet.flanks:
+        meshes.setdefault((flank.family, flank.sense), []).append(flank)
         remarks |= dict.fromkeys(f"{flank.family}: {name} {reason}" for name, reason in flank.lacking.items())
         remarks |= dict.fromkeys(f"{flank.gear} in {flank.family}: {remark}" for remark in flank.remarks)
     factors = [
-        Table(f"Mesh {mesh}", [*_rows(own, sheet.other_edition)], [Column("factor", _factor), *map(_column, own)])
-        for mesh, own in _meshes(sheet)
+        Table(
+            f"Mesh {family}" if sense > 0 else f"Mesh {family}, reversed load",
+            [*_rows(own, sheet.other_edition)],
+            [Column("factor", _factor), *map(_column, own)],
+        )
+        for (family, sense), own in meshes.items()
     ]
     return Outcome(
-        verdict=f"Smallest {smallest}" if flanks else "No loaded flanks",
+        verdict=f"Smallest {', '.join(smallest)}" if flanks else "No loaded flanks",
         summary={"case": case, "name": name, "rating": sheet.summary()},
         tables=[Table(title, flanks, FLANKS, FLANK_LEGEND, noun="flanks"), *factors],
         findings=[
@@ -89,21 +98,6 @@ def rating_outcome(sheet: RatingSheet, case: str, name: str) -> Outcome:
         ],
         failure=failure_text("safety factors below the required minimum:", sheet.shortfalls),
     )
-
-
-def _smallest(flanks: list[FlankSheet], symbol: str) -> str:
-    """Return the smallest safety factor of all flanks, and the gear that has it."""
-    least = min(flanks, key=lambda flank: _value(symbol, flank))
-    return f"{symbol} {_value(symbol, least):.2f} ({least.gear} {least.flank}, {least.family})"
-
-
-def _meshes(sheet: RatingSheet) -> Iterator[tuple[str, list[FlankSheet]]]:
-    """Yield the gears of each mesh for one direction of load, with a title."""
-    found: dict[tuple[str, int], list[FlankSheet]] = {}
-    for flank in sheet.flanks:
-        found.setdefault((flank.family, flank.sense), []).append(flank)
-    for (family, sense), flanks in found.items():
-        yield family if sense > 0 else f"{family}, reversed load", flanks
 
 
 def _rows(flanks: list[FlankSheet], other_edition: str) -> Iterator[tuple[str, str, str]]:

@@ -193,7 +193,11 @@ def summarise_loads(
     for name, (lines, values) in series.items():
         torques[:, names.index(name)] += np.interp(times, lines, values)
     rates, added = _rates(gearbox, case, axial, torques)
-    spins = _speeds(gearbox, case, times, rates)
+    start = gearbox.start_speeds(case)
+    # Torques are linear between the instants, so the trapezoidal rule is exact.
+    gained = np.cumsum(0.5 * (rates[1:] + rates[:-1]) * np.diff(times)[:, None], axis=0)
+    gained = np.concatenate([np.zeros((1, rates.shape[1])), gained])
+    spins = np.asarray(np.array([start[name] for name in names]) + gained)
     speeds = spins[:, names.index(reference)]
     # Mesh forces F_bt (times, meshes) for balanced torques; of minimum norm if meshes share.
     balanced = torques + added - rates * axial
@@ -515,15 +519,6 @@ def _rates(gearbox: Gearbox, case: LoadCase, axial: Floats, torques: Floats) -> 
     solved = np.linalg.solve(bordered, np.concatenate([loads, rate]))
     added[:, driven] = scale * solved[-1]
     return (modes @ solved[:-1]).T, added
-
-
-def _speeds(gearbox: Gearbox, case: LoadCase, times: Floats, rates: Floats) -> Floats:
-    """Rotational speeds (times, bodies), rad/s, from the start of a load case."""
-    start = gearbox.start_speeds(case)
-    # Torques are linear between the instants, so the trapezoidal rule is exact.
-    gained = np.cumsum(0.5 * (rates[1:] + rates[:-1]) * np.diff(times)[:, None], axis=0)
-    gained = np.concatenate([np.zeros((1, rates.shape[1])), gained])
-    return np.asarray(np.array([start[name] for name in gearbox.spinning]) + gained)
 
 
 def drive_rate(gearbox: Gearbox, case: LoadCase) -> float:

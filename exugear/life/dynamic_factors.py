@@ -236,7 +236,9 @@ def factors_of_response(assembly: Assembly, rating: RatingSection, path: Path, b
 def family_factors(data: xr.Dataset, family: str, mesh: str, planets: PlanetSet | None, order: float) -> Floats:
     """Return the largest ratio of maximum to mean force in a window at each speed, over all windows and planets."""
     signals = [str(name) for name in data["signal"].to_numpy()]
-    labels = [mesh] if planets is None else _labels(family, planets)
+    labels = [mesh]
+    if planets is not None:
+        labels = [family, *(f"{family} {wave_name(n, planets.waves)}" for n in range(1, planets.waves))]
     places = [signals.index(f"mesh_force {label}") for label in labels if f"mesh_force {label}" in signals]
     size, phase = (data[key].to_numpy()[:, :, places].astype(np.float64) for key in ("amplitude", "phase"))
     lines = size * np.exp(1j * phase)
@@ -252,11 +254,6 @@ def family_factors(data: xr.Dataset, family: str, mesh: str, planets: PlanetSet 
         mean = windows.mean(axis=2)
         found[n] = np.max(windows.max(axis=2) / np.where(mean > 0.0, mean, np.inf), initial=1.0)
     return found
-
-
-def _labels(family: str, planets: PlanetSet) -> list[str]:
-    names = (wave_name(n, planets.waves) for n in range(1, planets.waves))
-    return [family, *(f"{family} {name}" for name in names)]
 
 
 def _sampled(lines: Complexes, orders: Floats, order: float) -> tuple[Floats, Floats]:

@@ -329,15 +329,6 @@ def compute_life(
     )
 
 
-def _hub_in_words(counted: CountedLoads) -> str:
-    if not counted.points.other.any():
-        return "torque only: no rotor forces or moments"
-    return (
-        f"rotor forces and moments on {counted.body} in {len(counted.points.torque)} points; their effect is linear "
-        "at each torque"
-    )
-
-
 def _unrated(assembly: Assembly, counted: CountedLoads, stresses: Mapping[str, MeshCycleStress]) -> list[str]:
     gearbox = assembly.gearbox
     lines = []
@@ -369,8 +360,12 @@ def _assumptions(
 ) -> list[str]:
     count = len(balance.torque)
     turns = len(balance.angle)
+    hub = "torque only: no rotor forces or moments"
+    if counted.points.other.any():
+        hub = f"rotor forces and moments on {counted.body} in {len(counted.points.torque)} points; their effect is "
+        hub += "linear at each torque"
     lines = [
-        _hub_in_words(counted),
+        hub,
         f"static balance at {count} torque{'s' * (count > 1)} and {turns} carrier angle{'s' * (turns > 1)}, "
         + ("proportional to torque" if balance.linear else "forces interpolated linearly over torque"),
         _dynamic_in_words(rating, dynamic, acting) + "; none on bearings",

@@ -471,15 +471,11 @@ def read_run(path: Path, names: Iterable[str]) -> tuple[dict[str, NDArray[Any]],
         unknown = sorted(set(names) - set(run.variables))
         if unknown:
             raise FileError(f"{path}: contains no {unknown[0]}")
-        return {name: _values(run.variables[name]) for name in names}, dict(run.attrs)
-
-
-def _values(variable: h5netcdf.Variable) -> NDArray[Any]:
-    """Values of a variable; texts are converted to Python strings."""
-    values = np.asarray(variable[...])
-    if values.dtype == object:
-        return np.array([text.decode() for text in values], dtype=str)
-    return values
+        found = {name: np.asarray(run.variables[name][...]) for name in names}
+        for name, values in found.items():
+            if values.dtype == object:  # texts are read as bytes
+                found[name] = np.array([text.decode() for text in values], dtype=str)
+        return found, dict(run.attrs)
 
 
 def _load_pieces(folder: Path, wanted: list[str] | None) -> xr.Dataset:

@@ -199,7 +199,19 @@ def lacking(gearbox: Gearbox, variant: str) -> str:
     lack = unsupported(gearbox, variant)
     if lack or not chosen.has_bearings:
         return lack
-    return _misfits(gearbox, chosen) or free_motion(gearbox, variant) or _misplaced_factors(gearbox, chosen)
+    elastic = elastic_names(gearbox) if chosen.is_elastic else ()
+    # The first error that `check_parts` finds in flexible bodies: an impossible body, or a seat off the body.
+    for name in elastic:
+        try:
+            check_elastic_body(gearbox, name)
+        except GearboxFileError as error:
+            return error.errors[0].removeprefix(f"{gearbox.source}: ")
+    if unheld := free_motion(gearbox, variant):
+        return unheld
+    # A bearing's seat may be one that no factor can stand for; an elastic housing has seats of its own.
+    seats = {body.name for body in gearbox.bodies() if body.fixed and body.name in elastic}
+    reasons = (misplaced_factor(bearing) for bearing in gearbox.bearings if not seats & {bearing.on, bearing.body})
+    return next(filter(None, reasons), "")
 
 
 def usual_variant(gearbox: Gearbox) -> Variant:
@@ -211,24 +223,6 @@ def usual_variant(gearbox: Gearbox) -> Variant:
     'bushing'
     """
     return Variant.rigid if lacking(gearbox, Variant.bushing) else Variant.bushing
-
-
-def _misfits(gearbox: Gearbox, variant: Variant) -> str:
-    """Return the first error of `check_parts` about flexible bodies: an impossible body, or a seat off the body."""
-    for name in elastic_names(gearbox) if variant.is_elastic else ():
-        try:
-            check_elastic_body(gearbox, name)
-        except GearboxFileError as error:
-            return error.errors[0].removeprefix(f"{gearbox.source}: ")
-    return ""
-
-
-def _misplaced_factors(gearbox: Gearbox, variant: Variant) -> str:
-    """Say which bearing's seat no factor can stand for; an elastic housing has seats of its own."""
-    elastic = elastic_names(gearbox) if variant.is_elastic else ()
-    seats = {body.name for body in gearbox.bodies() if body.fixed and body.name in elastic}
-    reasons = (misplaced_factor(bearing) for bearing in gearbox.bearings if not seats & {bearing.on, bearing.body})
-    return next(filter(None, reasons), "")
 
 
 def gearbox_warnings(gearbox: Gearbox) -> tuple[str, ...]:
@@ -254,20 +248,16 @@ def gearbox_warnings(gearbox: Gearbox) -> tuple[str, ...]:
             lines += narrowed_seats(gearbox, name)
         if section.external is not None:
             lines += external_warnings(gearbox, name)
-        lines += _reactions_at_main_seat(gearbox, name)
+        # For want of a seat of their own, reactions of stated loads act at the main seat of a flexible body.
+        table, own = ("solid", section.solid) if section.solid is not None else ("external", section.external)
+        for load in gearbox.varying_loads:
+            if own is not None and load.reaction_on == name and load.excitation not in own.seats:
+                lines.append(
+                    f"excitations.{load.excitation}.reaction_on = {name!r}: the reaction acts at the seat of torques "
+                    f"of this flexible body; add [bodies.{name}.{table}.seats.{load.excitation}] where the stator is "
+                    "fastened"
+                )
     return tuple(dict.fromkeys(lines))
-
-
-def _reactions_at_main_seat(gearbox: Gearbox, name: str) -> Iterator[str]:
-    """Name stated loads whose reaction acts at the main seat of a flexible body, for want of a seat of their own."""
-    section = gearbox.case.bodies[gearbox.body(name).family]
-    table, own = ("solid", section.solid) if section.solid is not None else ("external", section.external)
-    for load in gearbox.varying_loads:
-        if own is not None and load.reaction_on == name and load.excitation not in own.seats:
-            yield (
-                f"excitations.{load.excitation}.reaction_on = {name!r}: the reaction acts at the seat of torques of "
-                f"this flexible body; add [bodies.{name}.{table}.seats.{load.excitation}] where the stator is fastened"
-            )
 
 
 def _build_bearing(gearbox: Gearbox, bearing: Bearing) -> None:

@@ -191,7 +191,11 @@ def assumed_parameters(
         )
     body = gearbox.body(gearbox.case.overall.output, inertias)
     sets = [gearbox.body(body.name, name).axial for name in gearbox.inertia_sets]
-    values = _spanning(min(sets), max(sets), body.axial)
+    low, high = min(sets), max(sets)
+    # Values around the one there is, or over the range of the inertia sets.
+    values = tuple(body.axial * part for part in FRACTIONS)
+    if high >= 1.2 * low:
+        values = tuple(sorted({*np.geomspace(low, high, 12).tolist()[1:-1], low, high, body.axial}))
     label = f"axial inertia of {body.name} / kg m²"
     parameters.append(
         Parameter(label, values, body.axial, lambda x: built(_inertia_changes(gearbox, body, inertias, x), touching))
@@ -220,13 +224,6 @@ def _inertia_changes(gearbox: Gearbox, body: Body, inertias: str, axial: float) 
         return {f"{place}.{inertias}.{key}": value for key, value in values.items()}
     values |= {"mass_kg": body.mass, "centre_of_mass_z_mm": 1e3 * body.centre_of_mass_z}
     return {f"{place}.{name}.{key}": value for name in gearbox.inertia_sets for key, value in values.items()}
-
-
-def _spanning(low: float, high: float, default: float) -> tuple[float, ...]:
-    """Values over the range of the inertia sets, or around the one there is."""
-    if high < 1.2 * low:
-        return tuple(default * part for part in FRACTIONS)
-    return tuple(sorted({*np.geomspace(low, high, 12).tolist()[1:-1], low, high, default}))
 
 
 def planet_bearings(gearbox: Gearbox, assembly: Assembly) -> tuple[int, ...]:

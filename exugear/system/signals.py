@@ -85,11 +85,6 @@ class Signal(Variable):
         """Whether it is a time that is added up for each mesh."""
         return self.dimensions == ("mesh",)
 
-    @property
-    def is_balance_term(self) -> bool:
-        """Whether it is a term of the energy balance."""
-        return self.dimensions == ("balance_time",) and bool(self.filled_by)
-
 
 def _work_taken(name: str, long_name: str, *filled_by: str) -> Signal:
     """Work that a part of the model takes from the system, as a term of the energy balance."""
@@ -284,7 +279,7 @@ bearings whose rate is not the derivative of their displacement (see `exugear.sy
 """
 MESH_TIMES = tuple(signal.name for signal in SIGNALS if signal.is_mesh_time)
 """Times (s) that a run adds up for each mesh."""
-BALANCE_TERMS = tuple(signal.name for signal in SIGNALS if signal.is_balance_term)
+BALANCE_TERMS = tuple(signal.name for signal in SIGNALS if signal.dimensions == ("balance_time",) and signal.filled_by)
 """Terms of the energy balance."""
 POWERS = tuple(signal.name for signal in SIGNALS if signal.is_power)
 """Terms of the account whose power is observed."""

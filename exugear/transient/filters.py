@@ -274,7 +274,8 @@ def stored_filter(assembly: Assembly, method: Method, step: float, factor: int) 
     low_pass = taps[:, 0].copy()
     other = np.zeros_like(taps)
     for lag in np.unique(lags[np.isfinite(lags)]):
-        taps[:, lags == lag] += _cascade(low_pass, _remedy(method, lag, rows))[:, None]
+        error = ahead_of_correction(method, ANGLES, lag)
+        taps[:, lags == lag] += _cascade(low_pass, _fitted(-error, 1.0 + error, error, rows))[:, None]
     first = layout["mesh_force"].start
     before = layout["mesh_force"].start - layout["mesh_dte"].start
     for m in _meshes(assembly):
@@ -287,12 +288,6 @@ def stored_filter(assembly: Assembly, method: Method, step: float, factor: int) 
 def _meshes(assembly: Assembly) -> Integers:
     """Meshes that the loop leaves as they were evaluated."""
     return np.flatnonzero(~spinning_alone(assembly.meshes))
-
-
-def _remedy(method: Method, lag: float, half: int) -> Floats:
-    """Taps (2 half + 1,) of what a column is changed by, on itself."""
-    error = ahead_of_correction(method, ANGLES, lag)
-    return _fitted(-error, 1.0 + error, error, half)
 
 
 def _remedy_of_force(method: Method, stiffness: float, damping: float, half: int) -> Floats:

@@ -229,6 +229,16 @@ class RunPlan:
         """Attributes that the file of the run begins with."""
         assembly = self.assembly
         gearbox = self.assembly.gearbox
+        # What the method and its step are expected to do is known of the compiled solver alone.
+        expectations: dict[str, float] = {}
+        if self.solver == "compiled":
+            chosen = self.integration
+            figures = (chosen.margin, chosen.forced_error, chosen.resonance_error)
+            expectations = dict(zip(EXPECTATIONS, figures, strict=True))
+            solver = f"compiled, {chosen.method.name}"
+        else:
+            meshes = ", meshes as loads" if self.mesh_route == "loads" else ""
+            solver = f"Exudyn {version('exudyn')}, {'generalized-alpha' if self.is_implicit else 'RK44'}{meshes}"
         return {
             "gearbox": gearbox.name,
             "variant": str(assembly.variant),
@@ -247,25 +257,11 @@ class RunPlan:
             "step": self.step,
             "band": self.band,
             "fastest_eigenvalue": self.integration.fastest_rate,
-            **self._expectations(),
-            "solver": self._solver_name(),
+            **expectations,
+            "solver": solver,
             "mesh_route": self.mesh_route,
             "complete": 0,
         }
-
-    def _expectations(self) -> dict[str, float]:
-        """Return what the method and its step are expected to do; it is known of the compiled solver alone."""
-        if self.solver != "compiled":
-            return {}
-        chosen = self.integration
-        figures = (chosen.margin, chosen.forced_error, chosen.resonance_error)
-        return dict(zip(EXPECTATIONS, figures, strict=True))
-
-    def _solver_name(self) -> str:
-        if self.solver == "compiled":
-            return f"compiled, {self.integration.method.name}"
-        meshes = ", meshes as loads" if self.mesh_route == "loads" else ""
-        return f"Exudyn {version('exudyn')}, {'generalized-alpha' if self.is_implicit else 'RK44'}{meshes}"
 
 
 def plan_run(

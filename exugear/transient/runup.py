@@ -25,7 +25,6 @@ from exugear.results.run_file import RunFile
 from exugear.system.bodies.elastic_body import ElasticBody
 from exugear.system.build import assemble
 from exugear.system.signals import signal_layout
-from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.element import Angles, MeshData, friction_lack
 from exugear.transient.compiled.integrator import INTEGRATORS, choose_integration, fastest_motion
 from exugear.transient.compiled.solver import CompiledSystem, unsupported_reason
@@ -245,7 +244,12 @@ def simulate(
     total = case.duration if duration is None else duration
     if integrator is not None and integrator not in INTEGRATORS:
         raise RunError(f"integrator {integrator!r} is unknown; integrators are {', '.join(INTEGRATORS)}")
-    chosen = _solver(solver, assembly, mesh_route)
+    if solver is not None and solver not in SOLVERS:
+        raise RunError(f"solver {solver!r} is unknown; solvers are {', '.join(SOLVERS)}")
+    reason = unsupported_reason(assembly) if mesh_route == "element" else "user-function loads exist in Exudyn only"
+    if solver == "compiled" and reason:
+        raise RunError(f"the compiled solver cannot run this: {reason}; use --solver exudyn")
+    chosen = "exudyn" if reason else solver or "compiled"
     kind = integrator if chosen == "compiled" else "rk4"  # Exudyn's explicit method is the same
     integration = choose_integration(assembly, sample_rate, band, step=step, integrator=kind)
     if step is None and too_fine(integration.step, total, sample_rate):
@@ -277,13 +281,3 @@ def simulate(
                 start.pieces.note("complete", 1)
                 file.finish()
         return run
-
-
-def _solver(asked: str | None, assembly: Assembly, mesh_route: str) -> str:
-    """Solver to take: the one asked for if it can, else the compiled one where it applies."""
-    if asked is not None and asked not in SOLVERS:
-        raise RunError(f"solver {asked!r} is unknown; solvers are {', '.join(SOLVERS)}")
-    reason = unsupported_reason(assembly) if mesh_route == "element" else "user-function loads exist in Exudyn only"
-    if asked == "compiled" and reason:
-        raise RunError(f"the compiled solver cannot run this: {reason}; use --solver exudyn")
-    return "exudyn" if reason else asked or "compiled"

@@ -317,7 +317,9 @@ def reaches_form_circle(flanks: Flanks, cells: Cells, force: Floats) -> bool:
     """Whether loaded cells lie at or beyond a form diameter, where the involute ends and the fillet begins."""
     touching = force > 0.0
     for flank, roll in _flanks_with_fillets(flanks, cells):
-        margin = _above(flank, roll[touching])
+        # How far points lie on the flank's side of the form diameter.
+        form = _form_roll(flank)
+        margin = form - roll[touching] if flank.gear.internal else roll[touching] - form
         if (margin < _AT_FORM_CIRCLE * np.ptp(flank.roll)).any():
             return True
     return bool((_parts_beyond(flanks, cells)[touching] > 0.0).any())
@@ -354,11 +356,6 @@ def _flanks_with_fillets(flanks: Flanks, cells: Cells) -> list[tuple[FlankCompli
 
 def _form_roll(flank: FlankCompliance) -> float:
     return float(flank.roll[-1] if flank.gear.internal else flank.roll[0])
-
-
-def _above(flank: FlankCompliance, roll: Floats) -> Floats:
-    """Roll angles by which points of a gear lie on the flank side of the form diameter."""
-    return _form_roll(flank) - roll if flank.gear.internal else roll - _form_roll(flank)
 
 
 def _parts_beyond(flanks: Flanks, cells: Cells) -> Floats:

@@ -54,6 +54,12 @@ class LongTask:
         """Return what the page shows of it."""
         code = self.process.poll() if self.seconds is not None else None
         state = "running" if code is None else "cancelled" if self.cancelled and code else "failed" if code else "done"
+        lines = list(self.lines)
+        message = ""
+        if state == "failed":
+            # A command that says no reason is told by its last line.
+            starts = [number for number, line in enumerate(lines) if line.startswith(REASONS)]
+            message = " ".join(lines[starts[-1] if starts else -1 :])
         return {
             "kind": self.kind,
             "name": KINDS[self.kind],
@@ -61,15 +67,9 @@ class LongTask:
             "digest": self.digest,
             "seconds": round(self.seconds if self.seconds is not None else time.monotonic() - self.began, 1),
             "progress": dict(self.progress),
-            "message": _reason(list(self.lines)) if state == "failed" else "",
-            "lines": list(self.lines),
+            "message": message,
+            "lines": lines,
         }
-
-
-def _reason(lines: list[str]) -> str:
-    """Return the message of a command that failed; of one that says no reason its last line."""
-    starts = [number for number, line in enumerate(lines) if line.startswith(REASONS)]
-    return " ".join(lines[starts[-1] if starts else -1 :])
 
 
 class LongWork:

@@ -45,24 +45,19 @@ def check(case: Path, allow_dir: Path | None, as_json: bool, whole: bool) -> Non
     warnings = [f"load_cases.{own['load_case']}: {line}" for own in summary["load_cases"] for line in own["doubts"]]
     warnings += [*script_notes(gearbox), *summary["warnings"]]
     warnings += [own["span_doubt"] for own in summary["tooth_thickness"] if own["span_doubt"]]
+    findings = [Finding("warning", line) for line in warnings]
+    families = {bearing.name: bearing.family for bearing in gearbox.bearings}
+    if names := dict.fromkeys(families[name] for name in opposed_bearings(gearbox)):
+        text = f"bearings.{', '.join(names)}: locate in one axial direction each, opposed to each other; with "
+        text += "model = 'linear' their axial stiffness acts in both directions"
+        findings.append(Finding("note", text))
     Outcome(
         verdict=f"{gearbox.name}: no errors; {gearbox.train.ratio_text}",
         summary=summary,
         tables=check_tables(gearbox.case.overall.input, summary),
-        findings=[*(Finding("warning", line) for line in warnings), *_opposed_bearings(gearbox)],
+        findings=findings,
         remarks=[*summary["matrices"], *availability(summary)],
     ).show(as_json, whole)
-
-
-def _opposed_bearings(gearbox: Gearbox) -> Iterator[Finding]:
-    """Yield a note on single bearings in X or O arrangement, which the linear model keeps in both directions."""
-    families = {bearing.name: bearing.family for bearing in gearbox.bearings}
-    if names := dict.fromkeys(families[name] for name in opposed_bearings(gearbox)):
-        yield Finding(
-            "note",
-            f"bearings.{', '.join(names)}: locate in one axial direction each, opposed to each other; with "
-            "model = 'linear' their axial stiffness acts in both directions",
-        )
 
 
 def script_notes(gearbox: Gearbox) -> Iterator[str]:

@@ -44,8 +44,11 @@ def life(project: WatchedProject, as_json: bool, whole: bool) -> None:
     draw_life(data, path.with_suffix(".png"))
     found = {"case": project.gearbox.source, **summary(data), "file": str(path)}
     failures = [*found["failures"], *found["shortfalls"]]
+    years, hours = float(data.attrs["life_years"]), float(data["hours"].sum())
+    parts = _parts(found)
+    worst = f": damage {PARTS[2].cell(parts[0])}, {parts[0]['part']}, {parts[0]['mode']}" if parts else ""
     Outcome(
-        verdict=_verdict(found, float(data.attrs["life_years"]), float(data["hours"].sum())),
+        verdict=f"Life of {years:g} years, {hours:,.0f} h, {'not reached' if failures else 'reached'}{worst}",
         summary=found,
         tables=life_tables(found),
         findings=[
@@ -145,29 +148,17 @@ def _parts(found: Mapping[str, Any]) -> list[dict[str, Any]]:
     return sorted(parts, key=lambda part: -part["damage"])
 
 
-def _verdict(found: Mapping[str, Any], years: float, hours: float) -> str:
-    """Return whether the required life is reached, and which part limits it."""
-    parts = _parts(found)
-    worst = f": damage {PARTS[2].cell(parts[0])}, {parts[0]['part']}, {parts[0]['mode']}" if parts else ""
-    reached = "not reached" if found["failures"] or found["shortfalls"] else "reached"
-    return f"Life of {years:g} years, {hours:,.0f} h, {reached}{worst}"
-
-
-def _smallest_safeties(found: Mapping[str, Any]) -> str:
-    """Return the smallest safety factors of the gears: the parts with the largest damage may all be bearings."""
-    texts = []
+def life_tables(found: Mapping[str, Any]) -> list[Table]:
+    """Return the tables of all parts, and those of flanks, roots and bearings."""
+    title = "Tooth flanks: largest contact stress, safety against pitting"
+    # The legend names the gears, because the parts with the largest damage may all be bearings.
+    smallest = []
     for symbol, key in (("S_H", "contact_safety"), ("S_F", "root_safety")):
         rated = [flank for flank in found["flanks"] if math.isfinite(_number(flank.get(key, math.nan)))]
         if rated:
             least = min(rated, key=lambda flank: float(flank[key]))
-            texts.append(f"{symbol} {float(least[key]):.2f} ({least['flank']})")
-    return f"Smallest {', '.join(texts)}. " if texts else ""
-
-
-def life_tables(found: Mapping[str, Any]) -> list[Table]:
-    """Return the tables of all parts, and those of flanks, roots and bearings."""
-    title = "Tooth flanks: largest contact stress, safety against pitting"
-    legend = f"{_smallest_safeties(found)}{PART_LEGEND}"
+            smallest.append(f"{symbol} {float(least[key]):.2f} ({least['flank']})")
+    legend = f"Smallest {', '.join(smallest)}. {PART_LEGEND}" if smallest else PART_LEGEND
     return [
         Table("Parts with the largest fatigue damage", _parts(found), PARTS, legend, noun="parts"),
         Table(title, found["flanks"], FLANKS, CONTACT_LEGEND),

@@ -157,18 +157,18 @@ def _band(band: Sequence[float], digits: int = 2) -> str:
     return f"{significant(1e-3 * low, digits)}–{significant(1e-3 * high, digits)}"
 
 
-def _families(part: Mapping[str, Any]) -> str:
-    """Name of a family of equal parts, with their number."""
-    return f"{part['count']} × {part['family']}".removeprefix("1 × ")
-
-
 def _loss_factor(part: Mapping[str, Any]) -> str | None:
     return f"{part['loss_factor']:.3f}" + "*" * part["from_table"] if "loss_factor" in part else None
 
 
 _column, _detail = partial(Column, missing=""), partial(detail, missing="")
 PARTS = (
-    Column("part", lambda part: f"seal {part['name']}" if "name" in part else _families(part)),
+    Column(
+        "part",
+        lambda part: (
+            f"seal {part['name']}" if "name" in part else f"{part['count']} × {part['family']}".removeprefix("1 × ")
+        ),
+    ),
     _column("power\nkW", "power_W", _kilowatts),
     _column("P/C", "load_ratio", ".2g"),
     _column("speed\nrpm", "speed_rpm", partial(significant, digits=3)),

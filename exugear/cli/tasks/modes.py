@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -56,6 +56,11 @@ def modes(project: WatchedProject, as_json: bool, whole: bool) -> None:
         "file": str(path),
         "picture": str(picture),
     }
+    last, first = summary["modes"][-1], max(summary["modes"], key=lambda mode: mode["te_participation"])
+    verdict = f"{len(summary['modes'])} modes up to {COLUMNS[1].cell(last)} Hz"
+    if first["frequency_Hz"] > 0.0:
+        verdict += f"; largest TE participation {COLUMNS[3].cell(first)} %: mode {first['mode']}, "
+        verdict += f"{COLUMNS[1].cell(first)} Hz"
     findings = []
     if found.growth_rate > 0.0:
         text = f"unstable: disturbances grow at up to {found.growth_rate:.3g} 1/s; a run would diverge"
@@ -63,7 +68,7 @@ def modes(project: WatchedProject, as_json: bool, whole: bool) -> None:
     findings += [Finding("warning", text) for text in filter(None, [unusual_damping(found)])]
     damping = damping_in_words(assembly.gearbox.case.damping)
     Outcome(
-        verdict=_verdict(summary["modes"]),
+        verdict=verdict,
         summary=summary,
         tables=[mode_table(summary, whole)],
         findings=findings,
@@ -95,16 +100,6 @@ COLUMNS = (
     Column("TE\npart. %", _elastic("te_participation"), ".1f", 100),
     Column("TE\namplif.", _elastic("amplification"), ".1f"),
 )
-
-
-def _verdict(modes: Sequence[Mapping[str, Any]]) -> str:
-    """Return the number of modes and the one that takes the largest part in the transmission error."""
-    last, first = modes[-1], max(modes, key=lambda mode: mode["te_participation"])
-    text = f"{len(modes)} modes up to {COLUMNS[1].cell(last)} Hz"
-    if first["frequency_Hz"] > 0.0:
-        text += f"; largest TE participation {COLUMNS[3].cell(first)} %: mode {first['mode']}, "
-        text += f"{COLUMNS[1].cell(first)} Hz"
-    return text
 
 
 def mode_table(summary: Mapping[str, Any], whole: bool) -> Table:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -101,6 +101,15 @@ def steady(project: WatchedProject, settings: SteadySettings, quantity: str | No
     ranking = ranking_of(data, wanted=quantity or gearbox.case.report.quantity)
     summary = summarise(project, settings, data, shuttling, ranking)
     sound = summary["sound"]
+    findings = [*response_findings(data), *ranking.findings]
+    if summary["excited"]:
+        findings += shuttling_findings(shuttling, project.choice.mesh_model)
+    static = static_load_in_words(gearbox)
+    for name, load_case in gearbox.load_cases.items():
+        if other_load_warning(gearbox, summarise_loads(gearbox, load_case)):
+            text = f"the response is computed at the static load ({static}); load case {name} has another load "
+            text += f"({load_in_words(load_case)}): add --load-case {name} to compute it there"
+            findings.append(Finding("warning", text))
     near = [mesh for mesh in str(data.attrs["near_unconverged_states"]).split(", ") if mesh]
     Outcome(
         verdict=highest_resonance(gearbox, ranking) if summary["excited"] else "No excitation",
@@ -113,12 +122,7 @@ def steady(project: WatchedProject, settings: SteadySettings, quantity: str | No
             *filter(None, [source_table(gearbox, data)]),
             *(sound_tables(sound) if sound else ()),
         ],
-        findings=[
-            *response_findings(data),
-            *ranking.findings,
-            *(shuttling_findings(shuttling, project.choice.mesh_model) if summary["excited"] else ()),
-            *_other_loads(gearbox),
-        ],
+        findings=findings,
         path=summary["file"],
         failure=not_converged_failure(near),
         remarks=[_computed(gearbox, summary, data)],
@@ -214,16 +218,6 @@ def neglected_shuttling(project: Project) -> tuple[Shuttling, ...]:
     if law.moves_load or not law.needs_tables or project.choice.variant.spins_only:
         return ()
     return shuttling_pairs(project.gearbox, project.folder)
-
-
-def _other_loads(gearbox: Gearbox) -> Iterator[Finding]:
-    """Yield warnings about load cases whose mesh loads differ from the static load used for the response."""
-    static = static_load_in_words(gearbox)
-    for name, load_case in gearbox.load_cases.items():
-        if other_load_warning(gearbox, summarise_loads(gearbox, load_case)):
-            text = f"the response is computed at the static load ({static}); load case {name} has another load "
-            text += f"({load_in_words(load_case)}): add --load-case {name} to compute it there"
-            yield Finding("warning", text)
 
 
 def _computed(gearbox: Gearbox, summary: Mapping[str, Any], data: xr.Dataset) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import partial
 from operator import itemgetter
 from pathlib import Path
@@ -73,26 +73,28 @@ def study(
         minimised = () if search is None else tuple(_judged(read)[: len(search.minimise)])
         pictures = draw_study(result.dataset, folder, minimised)
     summary = summarise(read, result, pictures)
+    findings = [Finding("note", f"{summary['seconds_of_points']:.3g} s worker time in total")]
+    if result.dataset is None:
+        text = f"{summary['missing']} points belong to other shards; the last shard, or --merge, writes the dataset"
+        findings.append(Finding("warning", text))
+    elif read.tolerances is not None:
+        findings += [Finding("note", f"{name}: {result.dataset[name].attrs['long_name']}") for name in _judged(read)]
+    failures = [_beyond(read, result)]
+    if summary["failed"]:
+        line = f"{summary['failed']} of {summary['points']} points failed; errors: {folder}; use --retry-failed to "
+        failures.append(failure_text(f"{line}recompute them:", [f"- {error}" for error in summary["errors"]]))
+    elif summary["missing"] and summary["file"] is not None:
+        missing = f"{summary['missing']} of {summary['points']} points are missing"
+        failures.append(f"{missing}; run the study, or the unfinished shards")
     finished = f"{summary['finished']} of {summary['points']} points finished"
     Outcome(
         verdict=f"{read.file.name}: {finished}, {summary['computed']} computed now",
         summary=summary,
         tables=_tables(read, result.dataset),
-        findings=list(_findings(read, result, summary)),
+        findings=findings,
         path=folder if result.path is None else f"{result.path}, pictures",
-        failure="\n".join(filter(None, [_beyond(read, result), _failed(folder, summary)])),
+        failure="\n".join(filter(None, failures)),
     ).show(as_json, whole)
-
-
-def _failed(folder: Path, summary: dict[str, Any]) -> str:
-    """Return how many points failed or are missing; empty if none."""
-    if summary["failed"]:
-        line = f"{summary['failed']} of {summary['points']} points failed; errors: {folder}; use --retry-failed to "
-        return failure_text(f"{line}recompute them:", [f"- {error}" for error in summary["errors"]])
-    if summary["missing"] and summary["file"] is not None:
-        missing = f"{summary['missing']} of {summary['points']} points are missing"
-        return f"{missing}; run the study, or the unfinished shards"
-    return ""
 
 
 def shard_of_options(text: str | None, merge: bool) -> Shard:
@@ -170,16 +172,6 @@ def summarise(study: Study, swept: StudyResult, pictures: list[Path]) -> dict[st
         "file": None if swept.path is None else str(swept.path),
         "pictures": [str(picture) for picture in pictures],
     }
-
-
-def _findings(study: Study, swept: StudyResult, summary: dict[str, Any]) -> Iterator[Finding]:
-    yield Finding("note", f"{summary['seconds_of_points']:.3g} s worker time in total")
-    if swept.dataset is None:
-        text = f"{summary['missing']} points belong to other shards; the last shard, or --merge, writes the dataset"
-        yield Finding("warning", text)
-    elif study.tolerances is not None:
-        for name in _judged(study):
-            yield Finding("note", f"{name}: {swept.dataset[name].attrs['long_name']}")
 
 
 def _tables(study: Study, dataset: xr.Dataset | None) -> list[Table]:

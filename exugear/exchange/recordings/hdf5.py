@@ -69,7 +69,13 @@ def read_hdf5(path: Path, wanted: Sequence[str] | None = None) -> Recording:
             raise RecordingError(f"{path}: has no one-dimensional datasets of numbers; export the channels as such")
         chosen = [names[place] for place in places_of(path, names, wanted)]
         for name in (*chosen, *times):
-            _check_size(path, name, found[name], size)
+            declared = found[name].shape[0] * found[name].dtype.itemsize
+            if declared > _MOST_TIMES_THE_FILE * size:
+                raise RecordingError(
+                    f"{path}: dataset {name} declares {declared:g} bytes, more than a file of {size} bytes can hold; "
+                    "export it again"
+                )
+            check_sizes(path, f"dataset {name}", found[name].shape[0], 1.0)
         axes = [_time(path, name, signals[name], times) for name in chosen]
         rate = common_rate(path, chosen, [rate for rate, _ in axes])
         channels = [RecordedChannel(name, _unit(signals[name]), _values(signals[name])) for name in chosen]
@@ -114,16 +120,6 @@ def _datasets(path: Path, group: h5py.Group, before: str = "", depth: int = 0) -
             len(item.shape or ()) == 1 and item.dtype.kind in "iuf" and not (item.external or item.is_virtual)
         ):
             yield f"{before}{name}", item
-
-
-def _check_size(path: Path, name: str, data: h5py.Dataset, size: int) -> None:
-    declared = data.shape[0] * data.dtype.itemsize
-    if declared > _MOST_TIMES_THE_FILE * size:
-        raise RecordingError(
-            f"{path}: dataset {name} declares {declared:g} bytes, more than a file of {size} bytes can hold; export it "
-            "again"
-        )
-    check_sizes(path, f"dataset {name}", data.shape[0], 1.0)
 
 
 def _time(path: Path, name: str, data: h5py.Dataset, times: dict[str, h5py.Dataset]) -> tuple[float, float]:

@@ -402,7 +402,11 @@ def parse_model(content: bytes) -> Model:
     document = document_of(content)
     head = document.head(document.model)
     version = str(head.get("version", ""))
-    _check_version(version)
+    match = re.fullmatch(r"(\d{1,3})\.(\d{1,3})(\.\d{1,3})?", version)
+    stated_version = (int(match[1]), int(match[2])) if match else (0, 0)
+    if not LEAST_VERSION <= stated_version <= LAST_VERSION:
+        least, last = (".".join(map(str, pair)) for pair in (LEAST_VERSION, LAST_VERSION))
+        raise RexsError(f"the file is of REXS version '{plain(version)}'; versions {least} to {last} can be read")
     errors: list[str] = []
     components: dict[int, Component] = {}
     for node in document.children(document.model, "components"):
@@ -433,14 +437,6 @@ def parse_model(content: bytes) -> Model:
     )
     program = f"{head.get('applicationId', '')} {head.get('applicationVersion', '')}".strip()
     return Model(version, program, components, tuple(relations), cases)
-
-
-def _check_version(version: str) -> None:
-    match = re.fullmatch(r"(\d{1,3})\.(\d{1,3})(\.\d{1,3})?", version)
-    number = (int(match[1]), int(match[2])) if match else (0, 0)
-    if not LEAST_VERSION <= number <= LAST_VERSION:
-        least, last = (".".join(map(str, pair)) for pair in (LEAST_VERSION, LAST_VERSION))
-        raise RexsError(f"the file is of REXS version '{plain(version)}'; versions {least} to {last} can be read")
 
 
 def _component_number(document: Document, node: Any) -> int:

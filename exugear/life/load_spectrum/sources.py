@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import hashlib
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -380,8 +380,11 @@ class _SourceDraft:
             raise self.gearbox.error(f"{key}: {path}: a table of hours begins with {','.join(HOURS_HEADINGS)}")
         found: dict[str, float] = {}
         for number, row in enumerate(rows[1:], start=2):
-            hours = _hours_in(row)
-            if hours is None or row[0] in found:
+            try:
+                hours = float(row[1]) if len(row) == len(HOURS_HEADINGS) else math.nan
+            except ValueError:
+                hours = math.nan
+            if not 0.0 <= hours <= HOURS_PER_YEAR or row[0] in found:
                 raise self.gearbox.error(
                     f"{key}: {path}: line {number} has {shortened(','.join(row), 80)}; required are a file, each "
                     f"once, and its hours per year from 0 to {HOURS_PER_YEAR:g}"
@@ -443,6 +446,11 @@ class _SourceDraft:
         pools = [*self.pools.values()]
         section = self.section
         loaded = np.abs(samples.speed[samples.torque != 0.0])
+        if section.files is None and section.hours_table is None:
+            digest = self._digests[0][1]
+        else:
+            content = repr((sorted(self._digests), sorted((self._hours or {}).items())))
+            digest = hashlib.sha256(content.encode()).hexdigest()
         return LoadSource(
             name=self.name,
             kind=section.kind,
@@ -450,7 +458,7 @@ class _SourceDraft:
             file=str(section.files or self._digests[0][0]),
             files=len(self._digests),
             count=sum(pool.count for pool in pools) or len(samples),
-            digest=self._digest(),
+            digest=digest,
             torque=samples.torque,
             speed=samples.speed,
             hours=samples.lasting,
@@ -466,12 +474,6 @@ class _SourceDraft:
             equivalent_ranges=self._ranges(by_wind),
             remarks=self._remarks,
         )
-
-    def _digest(self) -> str:
-        if self.section.files is None and self.section.hours_table is None:
-            return self._digests[0][1]
-        content = repr((sorted(self._digests), sorted((self._hours or {}).items())))
-        return hashlib.sha256(content.encode()).hexdigest()
 
     def _table_in_hours(self) -> Samples:
         """Return the table's durations in hours of the life, or as fractions of the hours stated for the source."""
@@ -523,17 +525,6 @@ class _SourceDraft:
             for key, value in pool.equivalent_ranges().items():
                 found[key] = found.get(key, 0.0) + weights[group] / total * value ** key[1]
         return {key: value ** (1.0 / key[1]) for key, value in found.items()}
-
-
-def _hours_in(row: Sequence[str]) -> float | None:
-    """Return the hours in a line of a table of hours; None if invalid."""
-    try:
-        hours = float(row[1]) if len(row) == len(HOURS_HEADINGS) else math.nan
-    except ValueError:
-        return None
-    if 0.0 <= hours <= HOURS_PER_YEAR:
-        return hours
-    return None
 
 
 def describe_sources(sources: tuple[LoadSource, ...]) -> Iterator[str]:

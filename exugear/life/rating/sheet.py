@@ -266,15 +266,6 @@ def _load_in_words(gearbox: Gearbox, counted: CountedLoads) -> str:
     return f"nominal load: {torque} at {source.fastest / RPM:.4g} rpm, {hours:,.0f} h"
 
 
-def _shortfalls(rating: RatingSection, flanks: list[FlankSheet]) -> Iterator[str]:
-    for flank in flanks:
-        for name, asked in (("S_H", rating.minimum_S_H), ("S_F", rating.minimum_S_F)):
-            found = flank.standard[name]
-            if found < asked:
-                part = f"{flank.gear} {flank.flank} {flank.family}"
-                yield f"{part}: {name} = {found:.3g} to the standard, required {asked:g}"
-
-
 def _assumptions(gearbox: Gearbox, rating: RatingSection) -> Iterator[str]:
     if usual_variant(gearbox).has_bearings:
         yield "K_gamma and misalignment: static balance with elastic bearings and the mesh stiffness of ISO 6336-1"
@@ -509,11 +500,18 @@ def rated(
             if np.any(acting.points.torque * sense > 0.0):
                 flank = _flank(gearbox, rating, counted, acting, balance, tooth, sense, finite_elements.get(key, {}))
                 flanks += [] if flank is None else [flank]
+    shortfalls = [
+        f"{flank.gear} {flank.flank} {flank.family}: {name} = {flank.standard[name]:.3g} to the standard, "
+        f"required {asked:g}"
+        for flank in flanks
+        for name, asked in (("S_H", rating.minimum_S_H), ("S_F", rating.minimum_S_F))
+        if flank.standard[name] < asked
+    ]
     return RatingSheet(
         edition=rating.edition,
         load=_load_in_words(gearbox, counted),
         flanks=tuple(flanks),
-        shortfalls=tuple(_shortfalls(rating, flanks)),
+        shortfalls=tuple(shortfalls),
         assumptions=(*remarks, *_assumptions(gearbox, rating)),
         left_out=(*(f"{family}: not rated, {reason}" for family, reason in scope.items()), *NOT_RATED),
         other_edition=OTHER_EDITION[rating.edition],

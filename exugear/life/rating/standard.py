@@ -22,7 +22,6 @@ from fe_ste.standards.iso6336 import (
     Edition,
     FlankDeviations,
     Hardening,
-    MethodBStiffness,
     dynamic_factor,
     face_load_factor,
     helix_running_in,
@@ -206,7 +205,8 @@ def _load_factors(rules: FlankRules, loads: MeshLoads, place: int) -> dict[str, 
     resonance = resonance_speed(pair, stiffness.mesh_stiffness, mass)
     ratio = abs(float(loads.speed[place])) / resonance
     if left is not None:
-        dynamic = _dynamic(rules, stiffness, line_load, ratio, left)
+        relief = _running_in_relief(rules) if max(rules.classes or (FINE_CLASS + 1,)) <= FINE_CLASS else None
+        dynamic = dynamic_factor(ratio, pair.total_contact_ratio, stiffness.single_stiffness, line_load, left, relief)
     opening = float(loads.opening[place]) + (deviations.helix if deviations else 0.0)
     taken = _mean(rules, lambda kind, limit: helix_running_in(opening, kind, limit, velocity))
     face = face_load_factor(
@@ -236,14 +236,6 @@ def _load_factors(rules: FlankRules, loads: MeshLoads, place: int) -> dict[str, 
         "n_E1": resonance,
         "N": ratio,
     }
-
-
-def _dynamic(
-    rules: FlankRules, stiffness: MethodBStiffness, line_load: float, ratio: float, left: FlankDeviations
-) -> float:
-    pair = rules.pair
-    relief = _running_in_relief(rules) if max(rules.classes or (FINE_CLASS + 1,)) <= FINE_CLASS else None
-    return dynamic_factor(ratio, pair.total_contact_ratio, stiffness.single_stiffness, line_load, left, relief)
 
 
 def _running_in_relief(rules: FlankRules) -> float:

@@ -619,6 +619,9 @@ class HarmonicBalanceModel:
         has_loads = bool(self._friction.size or self.shaft_orders.sidebands)
         shape = ports.forces.shape[:2]
         rows = {name: system.at(values, speed) for name, values in self._rows.items()}
+        bearings = None
+        if self.bearings is not None:
+            bearings = BearingMean(*(system.at(np.array(own), speed) for own in zip(*self._bearing_means, strict=True)))
         return Interface(
             speed=speed,
             frequencies=frequencies,
@@ -629,7 +632,7 @@ class HarmonicBalanceModel:
             torque_per_force=still[-1, :of_meshes].reshape(shape),
             along_bearings=motion[..., of_meshes:],
             torque_along_bearings=still[-1, of_meshes:-1],
-            bearings=self._bearings_at(speed),
+            bearings=bearings,
             loads=LoadResponse(other, answer, float(still[-1, -1]), stated[:, system.size :]) if has_loads else None,
         )
 
@@ -736,12 +739,6 @@ class HarmonicBalanceModel:
         system.fill_responses(pencil, interface.frequencies[1:], none, answer[1:], batches, no_motion)
         response = LoadResponse(other, answer, float(still[-1]), loads[:, system.size :])
         return replace(interface, loads=response)
-
-    def _bearings_at(self, speed: float) -> BearingMean | None:
-        """Nonlinear bearings in the averaged system at a speed of the input, rad/s; None without any."""
-        if self.bearings is None:
-            return None
-        return BearingMean(*(self.system.at(np.array(own), speed) for own in zip(*self._bearing_means, strict=True)))
 
     def row_of_overall(self, speed: float) -> Floats:
         """Row (size,) of the overall transmission error by the frame's coordinates, m/m and m/rad."""

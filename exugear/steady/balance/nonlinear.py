@@ -269,7 +269,13 @@ class HarmonicResidual:
             back = self.places.back
             values, rates = self._sample_readings(readings - self.deviations)
             sampled = self._sample(there @ values, there @ rates, self.places, self._lattice_stiffness)
-            excess = self.sampling.coefficients(back @ sampled.force) - self._mean_part(readings) + self._dragged
+            # The averaged system has the mean forces at the static state without friction. What friction deflects is
+            # part of its motion.
+            beyond = readings.copy()
+            beyond[0] -= self.interface.ports.static
+            averaged = self._mean_slopes(beyond)
+            averaged[0] += self.mean_force
+            excess = self.sampling.coefficients(back @ sampled.force) - averaged + self._dragged
             self._last[:] = [(readings, excess, sampled)]
         _, excess, sampled = self._last[0]
         return excess, Tangent(self, sampled), sampled.force
@@ -405,16 +411,6 @@ class HarmonicResidual:
             found[:, m:, :COMPONENTS] = np.tensordot(own, slope, axes=([1, 2], [2, 3]))
         return found
 
-    def _mean_part(self, readings: Complexes) -> Complexes:
-        """Return the forces (n, m, f) of the averaged system under readings (n, m, r)."""
-        # The averaged system has the mean forces at the static state without friction. What friction deflects is
-        # part of its motion.
-        beyond = readings.copy()
-        beyond[0] -= self.interface.ports.static
-        slopes = self._mean_slopes(beyond)
-        slopes[0] += self.mean_force
-        return slopes
-
     def missing(self, readings: Complexes) -> Complexes:
         """Find what is missing to the balance (n, m, r)."""
         return readings - self.static - self.answer(self.forces(readings)[0])
@@ -455,11 +451,13 @@ class Tangent:
         """
         lengths = self.balance.model.lengths
         passing = self._passing
+        # Bearings of planets that are not alike have coordinates in `passing` beside the readings.
+        of_bearings = sum(len(own.coordinates) for own in self.balance.model.varying_bearings) if passing else 0
 
         def solved(wanted: Complexes) -> Complexes:
             found = self.alone(wanted)
             if passing:
-                rest = np.zeros((len(found), self._passing_bearings), dtype=complex)
+                rest = np.zeros((len(found), of_bearings), dtype=complex)
                 flat = found.reshape(len(found), -1)
                 own = solve_one_by_one(passing, np.hstack([flat, rest]))
                 found = own[:, : flat.shape[1]].reshape(found.shape)
@@ -477,11 +475,6 @@ class Tangent:
         found = right.reshape(len(right), -1).copy()
         found[:, read] = (self._inverse @ found[:, read, None])[..., 0]
         return found.reshape(right.shape)
-
-    @property
-    def _passing_bearings(self) -> int:
-        """Number of the coordinates of bearings in `_passing`: those of planets that are not alike."""
-        return sum(len(own.coordinates) for own in self.balance.model.varying_bearings)
 
     @cached_property
     def _passing(self) -> tuple[PassingPlanets, ...]:
@@ -635,20 +628,14 @@ def response_of_readings(balance: HarmonicResidual, readings: Complexes, product
         rates = rates_of(model, interface.speed, deflection)
         force = excess[:, :m, 0] + waves.mean_stiffness * deflection + waves.damping * rates
         force[0] -= waves.mean_stiffness * waves.rest
-    free = _free_shares(balance, whole)
+    # The shares of time in which bearings have no force are means over planets.
+    unloaded = np.zeros(0)
+    if model.bearings is not None:
+        laws = np.array([model.bearings.waves[n - m].law if n >= m else -1 for n in balance.places.means])
+        free = np.mean(~whole.any(axis=2), axis=0)
+        unloaded = np.array([free[laws == law].mean() for law in range(len(model.bearings.firsts))])
     of_bearings = balance.bearing_forces(excess)
-    return Response(interface, deflection, excess, force * waves.line_of_action, products, apart, free, of_bearings)
-
-
-def _free_shares(balance: HarmonicResidual, whole: Floats) -> Floats:
-    """Shares of time (b,) in which bearings have no force, which are whole (s, u, f) in all places; planets' mean."""
-    bearings = balance.model.bearings
-    m = balance.meshes
-    if bearings is None:
-        return np.zeros(0)
-    laws = np.array([bearings.waves[n - m].law if n >= m else -1 for n in balance.places.means])
-    free = np.mean(~whole.any(axis=2), axis=0)
-    return np.array([free[laws == law].mean() for law in range(len(bearings.firsts))])
+    return Response(interface, deflection, excess, force * waves.line_of_action, products, apart, unloaded, of_bearings)
 
 
 def _mean_of_waves(there: Floats, back: Floats, slopes: Floats) -> Floats:

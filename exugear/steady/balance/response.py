@@ -44,7 +44,7 @@ from exugear.steady.mean_system.mesh_places import (
 )
 from exugear.system.kernels.coordinates import BODY_SIZE
 from exugear.system.kernels.meshes import TILT_DAMPING, TILT_STIFFNESS
-from fe_ste.tools.arrays import Complexes, Floats, Integers
+from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.bundles import cached_bundle
 from fe_ste.tools.octets import SIZE
 
@@ -274,7 +274,13 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
     lengths = np.append(model.lengths[: shape[1], : shape[2]].ravel(), model.bearing_lengths)
     coordinates = model.bearing_coordinates
     answers = lengths[:, None] * interface.answers_with(coordinates)
-    still = _still(interface, shape, coordinates, lengths)
+    # These are the readings of meshes and bearings without forces beyond the averaged system.
+    still = interface.static[..., : shape[2]].reshape(shape[0], -1)
+    if coordinates.size:
+        loads = interface.loads
+        under_loads = np.zeros((shape[0], len(coordinates))) if loads is None else loads.motion[:, coordinates]
+        still = np.hstack([still, under_loads])
+    still = lengths * still
     repeated = bool(model.shaft_orders.sidebands or model.varying)
     balance = LineBalance(model, interface, answers, lengths)
     passing = balance.passing
@@ -306,16 +312,6 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
             balance = LineBalance(model, shifted, answers, lengths, passing)
             given = given_forces(model, shifted) + deviation_forces(model, shifted, passing)
     return _response(model, interface, deflection, excess, products)
-
-
-def _still(interface: Interface, shape: tuple[int, ...], coordinates: Integers, lengths: Floats) -> Complexes:
-    """Find readings (n, m f + c) of meshes (n, m, f) and bearings without forces beyond the averaged system."""
-    found = interface.static[..., : shape[2]].reshape(shape[0], -1)
-    if coordinates.size:
-        loads = interface.loads
-        moved = np.zeros((shape[0], len(coordinates))) if loads is None else loads.motion[:, coordinates]
-        found = np.hstack([found, moved])
-    return lengths * found
 
 
 class LineBalance:

@@ -362,7 +362,13 @@ class CycleFunctions:
 
     def _by_places(self, family: Family, spectrum: Complexes, ports: MeshInterface, speed: float) -> Complexes:
         """Functions by all places, each as far ahead as in the static state, with multiples of the carrier's angle."""
-        factors = _place_factors(family, len(spectrum) // 2, ports, speed)
+        samples = SAMPLED * family.turns if family.carrier >= 0 else 1
+        there, norms = _shapes_over_turn(family, speed, samples)
+        back = np.swapaxes(there / norms, -1, -2)
+        ahead = ports.positions[family.first] + np.array(family.ahead) + there @ ports.static[family.waves, POSITION]
+        turned = np.exp(2j * math.pi * np.arange(len(spectrum) // 2 + 1)[:, None, None] * ahead)
+        between = (back * turned[:, :, None, :]) @ there
+        factors = np.fft.fft(between, axis=1)[:, np.arange(-family.turns, family.turns + 1)] / samples
         factors = np.concatenate([factors[:0:-1, ::-1].conj(), factors])
         found = factors[:, :, :, None, :, None] * spectrum[:, None, None, :, None, :]
         return found.reshape(-1, family.count * self._forces, family.count * self._forces)
@@ -376,17 +382,6 @@ def _spectrum(spectra: Spectra, first: int, forces: int) -> Complexes:
         found[harmonics:, force, read] = values[first]
     found[:harmonics] = found[:harmonics:-1].conj()
     return found
-
-
-def _place_factors(family: Family, harmonics: int, ports: MeshInterface, speed: float) -> Complexes:
-    """Factors (h + 1, turns, waves, waves) of the harmonics by all places, each as far ahead as in the static state."""
-    samples = SAMPLED * family.turns if family.carrier >= 0 else 1
-    there, norms = _shapes_over_turn(family, speed, samples)
-    back = np.swapaxes(there / norms, -1, -2)
-    ahead = ports.positions[family.first] + np.array(family.ahead) + there @ ports.static[family.waves, POSITION]
-    turned = np.exp(2j * math.pi * np.arange(harmonics + 1)[:, None, None] * ahead)
-    between = (back * turned[:, :, None, :]) @ there
-    return np.asarray(np.fft.fft(between, axis=1)[:, np.arange(-family.turns, family.turns + 1)] / samples)
 
 
 def _shapes_over_turn(family: Family, speed: float, samples: int) -> tuple[Floats, Floats]:

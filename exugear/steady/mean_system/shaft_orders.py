@@ -327,10 +327,11 @@ class _Series:
             turns = self._most_turns(planets, count) + 1
             displaced[:turns, own] = -turned[:turns]
         shift, pushed = self._pin_motion(planets, most)
+        no_reaction = np.zeros(self.assembly.size + len(self.without_reactions), dtype=complex)
         for turn in range(most + 1):
             key = self._turns(planets, turn)
             self._add(self.displacement, (DEVIATION, key), displaced[turn])
-            self._add(self.reaction, (DEVIATION, key), self._no_reaction)
+            self._add(self.reaction, (DEVIATION, key), no_reaction)
             self._add(self.shift, (DEVIATION, key), shift[turn])
             self._add(self.centrifugal, (DEVIATION, key), pushed[turn])
         if (unequal := unequal_bearings(self.assembly, self.waves.system, planets)) is not None:
@@ -379,11 +380,6 @@ class _Series:
             self._add(self.reaction, (number, key), turned)
             self.beside.append((key, None, None))
             self.beside += [(key, base, reach) for base, reach in enumerate(self._reaches) if reach]
-
-    @property
-    def _no_reaction(self) -> Complexes:
-        """Forces and reactions of nothing, (size + 6 r,)."""
-        return np.zeros(self.assembly.size + len(self.without_reactions), dtype=complex)
 
     @cached_property
     def _turned_by_passing(self) -> Floats:

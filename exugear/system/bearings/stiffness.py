@@ -407,7 +407,9 @@ def with_equal_planets(connectors: ConnectorArrays, sets: Iterable[PlanetSupport
     largest = 0.0
     for members, angles in sets:
         if with_rows[members].all() and not connectors.rolling.cage_ratio[members].any():
-            phase[members] = angles + _mean_angle(phase[members] - angles)
+            away = phase[members] - angles
+            # Mean on the circle, on which these angles are near each other.
+            phase[members] = angles + math.atan2(float(np.sin(away).mean()), float(np.cos(away).mean()))
         turns = np.array([_turn(angle) for angle in angles])
         back = turns.transpose(0, 2, 1)
         largest = max(largest, _spread(back @ stiffness[members] @ turns))
@@ -430,11 +432,6 @@ def _spread(matrices: Floats) -> float:
     mean = matrices.mean(axis=0)
     size = np.sqrt(np.abs(np.diag(mean)).clip(min=1e-9 * np.abs(mean).max(initial=0.0) + 1e-300))
     return float(np.abs((matrices - mean) / np.outer(size, size))[:, :3, :3].max())
-
-
-def _mean_angle(angles: Floats) -> float:
-    """Mean of angles (n,) that are near each other on the circle, rad."""
-    return math.atan2(float(np.sin(angles).mean()), float(np.cos(angles).mean()))
 
 
 def _turn(angle: float) -> Floats:

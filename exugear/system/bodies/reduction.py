@@ -584,6 +584,10 @@ def _from_arrays(arrays: Mapping[str, NDArray[Any]]) -> ReducedBody:
     summary = {name: words["figures"][stored] for stored, name in _SUMMARY.items()}
     for name in ("free_interface_frequencies", "mass_scaled_frequencies"):
         summary[name] = {harmonic: tuple(values) for harmonic, values in summary[name].items()}
+    radiating = None
+    if "radiating_matrix" in arrays:
+        matrix, *sizes = (arrays[f"radiating_{name}"] for name in _RADIATING)
+        radiating = RadiatingSurface(matrix, *(float(size) for size in sizes))
     return ReducedBody(
         name=words["name"],
         seats=tuple(Seat(name, (x, y, z)) for name, (x, y, z) in words["seats"]),
@@ -592,12 +596,5 @@ def _from_arrays(arrays: Mapping[str, NDArray[Any]]) -> ReducedBody:
         modal_groups=tuple(words["groups"]),
         surface=BodySurface(**{name: arrays[name] for name in _SURFACE}),
         summary=ReductionSummary(**summary),
-        radiating=_radiating_from(arrays),
+        radiating=radiating,
     )
-
-
-def _radiating_from(arrays: Mapping[str, NDArray[Any]]) -> RadiatingSurface | None:
-    if "radiating_matrix" not in arrays:
-        return None
-    matrix, *sizes = (arrays[f"radiating_{name}"] for name in _RADIATING)
-    return RadiatingSurface(matrix, *(float(size) for size in sizes))

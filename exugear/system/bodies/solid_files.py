@@ -179,8 +179,12 @@ def read_solid(path: Path, unit: float = 1.0) -> Any:
     meshio = _library("meshio")
     if not path.is_file():
         raise SolidError(f"{path}: no such file")
-    if kind == "abaqus" and _includes(path):
-        raise SolidError(f"{path}: refers to another file by *INCLUDE; write the whole mesh into one file")
+    if kind == "abaqus":
+        with path.open(encoding="utf-8", errors="replace") as lines:
+            # As meshio interprets keywords.
+            keywords = (line.partition(",")[0].strip().replace("*", "").upper() for line in lines)
+            if "INCLUDE" in keywords:
+                raise SolidError(f"{path}: refers to another file by *INCLUDE; write the whole mesh into one file")
     try:
         content = _read_nastran(path, meshio) if kind == "nastran" else getattr(meshio, kind).read(str(path))
     except SolidError:
@@ -273,12 +277,6 @@ def _coordinate_system(line: str) -> str:
     if "," in line:
         return line.split(",")[2].strip() if line.count(",") > 1 else ""
     return line[24:40].strip() if line[:8].rstrip().endswith("*") else line[16:24].strip()
-
-
-def _includes(path: Path) -> bool:
-    """Return whether an Abaqus file includes another one; keywords as meshio interprets them."""
-    with path.open(encoding="utf-8", errors="replace") as lines:
-        return any(line.partition(",")[0].strip().replace("*", "").upper() == "INCLUDE" for line in lines)
 
 
 @dataclass(frozen=True)

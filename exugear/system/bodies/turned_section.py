@@ -221,7 +221,11 @@ class Shaft:
         self.mesh = self._tapered(self.lines)
         self.basis = skfem.Basis(self.mesh, skfem.ElementQuad2(), intorder=INTEGRATION_ORDER)
         self.nodes: Floats = np.asarray(self.basis.doflocs)
-        self._cylinder = self._radii_among_cylinders()
+        # Radius of each node among the cylinders that stand for the sections.
+        same = self.basis
+        if self.mesh is not self.lines:
+            same = skfem.Basis(self.lines, skfem.ElementQuad2(), intorder=INTEGRATION_ORDER)
+        self._cylinder: Floats = np.asarray(same.doflocs[0])
 
     @property
     def length(self) -> float:
@@ -238,13 +242,6 @@ class Shaft:
             return lines
         r, z = np.asarray(lines.p)
         return skfem.MeshQuad(np.stack([self.tapers.radius(r, z), z]), lines.t)
-
-    def _radii_among_cylinders(self) -> Floats:
-        """Radius of each node among the cylinders that stand for the sections."""
-        if self.mesh is self.lines:
-            return np.asarray(self.nodes[0])
-        same = skfem.Basis(self.lines, skfem.ElementQuad2(), intorder=INTEGRATION_ORDER)
-        return np.asarray(same.doflocs[0])
 
     def _locate(self, seat: SeatBand) -> tuple[int, float, float]:
         return locate(self.sections, seat)

@@ -32,16 +32,11 @@ class TurningBody:
         return len(self.reduced.seats)
 
     @cached_property
-    def seat_offsets(self) -> Floats:
-        """Positions of the seats from the axis, (seats, 2), m, from their displacement in the rigid spin."""
-        moved = self.reduced.spin[: 6 * self.seat_count].reshape(-1, 6)
-        return np.stack([moved[:, UY], -moved[:, UX]], axis=1)
-
-    @cached_property
     def angle_weights(self) -> Floats:
         """Weights s (n,) of the frame's angle psi = s . coordinates."""
-        # The mean spin of the seats off the axis: turning them by it displaces none of them.
-        off_axis = np.hypot(*self.seat_offsets.T) > 0.0
+        # The mean spin of the seats off the axis, which the rigid spin displaces: turning them by it displaces none.
+        moved = self.reduced.spin[: 6 * self.seat_count].reshape(-1, 6)
+        off_axis = np.hypot(moved[:, UX], moved[:, UY]) > 0.0
         chosen = off_axis if off_axis.any() else np.ones(self.seat_count, dtype=np.bool_)
         weights = np.zeros(self.reduced.size)
         weights[SPIN : 6 * self.seat_count : 6] = chosen / np.count_nonzero(chosen)

@@ -396,7 +396,8 @@ def mesh_elements(
             offset=offset,
             table=law.table_flanks(mesh, flank, ends, phase, data, time),
             computed_from=data.table if isinstance(data, MeshCurve) and flank == usual[mesh.name] else None,
-            load_ways=_load_ways(law, data, flank, usual[mesh.name]),
+            # A table holds the ways of its flank alone; on flank -1 it is turned about: ends of the face change places.
+            load_ways=flank * law.load_ways(data) if flank == usual[mesh.name] else np.zeros((2, 0)),
             friction=data.friction if isinstance(data, MeshCurve) and flank == usual[mesh.name] else None,
             friction_rows=friction_rows(mesh, flank, ends),
             friction_coefficient=gearbox.case.damping.tooth_friction,
@@ -405,14 +406,6 @@ def mesh_elements(
             element = replace(element.with_contact(known), computed_from=None)
         elements.append(element)
     return tuple(elements)
-
-
-def _load_ways(law: Law, data: MeshData, flank: int, usual: int) -> Floats:
-    """Ways of the load as `MeshElement.load_ways`; of the flank that a table is of, not of that behind."""
-    # A flank -1 is that of the table turned about: the ends of the face change places.
-    if flank == usual:
-        return flank * law.load_ways(data)
-    return np.zeros((2, 0))
 
 
 def _node(body: str, gear: Gear, bodies: Mapping[str, Body], nodes: Mapping[str, Floats] | None) -> Floats:

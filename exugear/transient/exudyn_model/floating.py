@@ -103,13 +103,6 @@ class FloatingSystem:
             [self.mbs.GetNodeODE2Index(node) + np.arange(sizes[node]) for node in (rigid, modal)]
         )
 
-    def _frame(self, q: Floats) -> tuple[Floats, Floats]:
-        """Rotation matrix, and matrix from rates of the rotation's parameters to angular velocity."""
-        parameters = q[self._rotation] + self._reference
-        if self._euler:
-            return euler_rotation(parameters)
-        return kinematics.RotXYZ2RotationMatrix(parameters), kinematics.RotXYZ2G(parameters)
-
     def _seat_motion(self, q: Floats, v: Floats, turn: Floats, arms: Floats, jacobian: Floats) -> tuple[Floats, Floats]:
         """Motion (6 s,) and velocity of the seats in axes that do not turn, with what `_kinematics` gives.
 
@@ -130,7 +123,12 @@ class FloatingSystem:
 
     def _kinematics(self, q: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """Rotation, its rate matrix, arms of the seats (s, 3), and velocities of the seats per rate (6 s, n)."""
-        turn, rates = self._frame(q)
+        # The rate matrix leads from the rates of the rotation's parameters to the angular velocity.
+        parameters = q[self._rotation] + self._reference
+        if self._euler:
+            turn, rates = euler_rotation(parameters)
+        else:
+            turn, rates = kinematics.RotXYZ2RotationMatrix(parameters), kinematics.RotXYZ2G(parameters)
         arms = (self._arms + self._moves @ q[self._modal]) @ turn.T
         jacobian = np.zeros((len(arms), 6, len(q)))
         jacobian[:, :3, :3] = np.eye(3)

@@ -143,14 +143,10 @@ def add_loads(parts: Parts, loads: LoadTable) -> None:
                 markerNumbers=[ground, parts.spin_marker(drive.body)],
                 stiffness=drive.stiffness,
                 damping=drive.damping,
-                springForceUserFunction=_torque_function(drive.torque),
+                # The force of this spring to the ground is a torque over time, angle and speed.
+                springForceUserFunction=lambda mbs, t, item, u, v, k, d, offset: -drive.torque(t, u, v),
             )
         )
-
-
-def _torque_function(torque: Callable[[float, float, float], float]) -> Callable[..., float]:
-    """Return the force of a spring to the ground that is a torque over time, angle and speed."""
-    return lambda mbs, t, item, u, v, k, d, offset: -torque(t, u, v)
 
 
 def _load_function(loads: LoadTable, body: str) -> Callable[[Any, float, float], float]:

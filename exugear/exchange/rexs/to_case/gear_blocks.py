@@ -95,10 +95,17 @@ def teeth_of(model: Model, places: ComponentPositions, bodies: RigidGroups, note
     lost = [str(gears[number].part) for number in gears if number not in owners]
     if lost:
         raise RexsError(f"{', '.join(lost)}: no relation defines its shaft")
+    pairs: dict[str, Stage] = {}
+    for number, stage in enumerate(stages, 1):
+        planet = next((owners[gear].name for gear in stage.both if owners[gear].carrier), "")
+        of_planets = owners[stage.pinion].carrier and owners[stage.gear].carrier
+        central = "ring" if gears[stage.gear].internal else "sun"
+        name = f"{central}_{planet}" if planet and not of_planets else ""
+        pairs[name if name and name not in pairs else f"stage_{number}"] = stage
     return Teeth(
         gears,
         _gear_names(gears, stages, owners),
-        dict(zip(_pair_names(gears, stages, owners), stages, strict=True)),
+        pairs,
         owners,
         {number: places.position(gear.part)[2] for number, gear in gears.items()},
     )
@@ -281,17 +288,6 @@ def _gear_names(
         for role, numbers in roles.items()
         for place, number in enumerate(numbers, 1)
     }
-
-
-def _pair_names(gears: Mapping[int, Toothing], stages: Sequence[Stage], owners: Mapping[int, RigidGroup]) -> list[str]:
-    names: list[str] = []
-    for number, stage in enumerate(stages, 1):
-        planet = next((owners[gear].name for gear in stage.both if owners[gear].carrier), "")
-        both = owners[stage.pinion].carrier and owners[stage.gear].carrier
-        mate = "ring" if gears[stage.gear].internal else "sun"
-        name = f"{mate}_{planet}" if planet and not both else ""
-        names.append(name if name and name not in names else f"stage_{number}")
-    return names
 
 
 def gear_blocks(

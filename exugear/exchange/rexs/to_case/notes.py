@@ -273,7 +273,14 @@ class ComponentPositions(ReprMixin):
         if depth > LONGEST_CHAIN:
             raise RexsError(f"{part}: its position refers to a circular chain of components")
         origin = np.array(part.vector("support_vector") or (0.0, 0.0, 0.0))
-        axes = _own_axes(part)
+        u = np.array(part.vector("u_axis_vector") or (1.0, 0.0, 0.0))
+        w = np.array(part.vector("w_axis_vector") or (0.0, 0.0, 1.0))
+        lengths = np.linalg.norm(u), np.linalg.norm(w)
+        if min(lengths) < 1e-9 or abs(u @ w) > 1e-6 * lengths[0] * lengths[1]:
+            raise RexsError(f"{part}: u_axis_vector and w_axis_vector are not perpendicular")
+        u = u / lengths[0]
+        w = w / lengths[1]
+        axes = np.column_stack([u, np.cross(w, u), w])
         reference = part.whole("reference_component_for_position")
         if reference is not None and reference != part.number:
             if reference not in self._model.components:
@@ -283,18 +290,6 @@ class ComponentPositions(ReprMixin):
             axes = turned @ axes
         self._frames[part.number] = origin, axes
         return origin, axes
-
-
-def _own_axes(part: Component) -> Floats:
-    """Axes u, v, w as columns, from u and w."""
-    u = np.array(part.vector("u_axis_vector") or (1.0, 0.0, 0.0))
-    w = np.array(part.vector("w_axis_vector") or (0.0, 0.0, 1.0))
-    lengths = np.linalg.norm(u), np.linalg.norm(w)
-    if min(lengths) < 1e-9 or abs(u @ w) > 1e-6 * lengths[0] * lengths[1]:
-        raise RexsError(f"{part}: u_axis_vector and w_axis_vector are not perpendicular")
-    u = u / lengths[0]
-    w = w / lengths[1]
-    return np.column_stack([u, np.cross(w, u), w])
 
 
 def _axes(directions: list[Floats], unit: Floats) -> Floats:

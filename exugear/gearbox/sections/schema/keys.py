@@ -78,8 +78,12 @@ def keys() -> Iterator[Key]:
             found = found[0] if isinstance(found, list) else found
         given = dict(found)
         for name, field in model.model_fields.items():
-            if not _model_within(field.annotation):
-                yield _key(table, name, field, texts[name], given[name])
+            if _model_within(field.annotation):
+                continue
+            limits = _range(field.annotation) or next((one for one in field.metadata if isinstance(one, Range)), None)
+            told = "" if limits is None else f"{limits.least:g} to {limits.most:g}"
+            kind = _kind(field.annotation)
+            yield Key(table, name, unit_of(name), kind, told, _default(field), texts[name], given[name])
 
 
 @cache
@@ -123,12 +127,6 @@ def _bare(kind: Any) -> Any:
         others = [part for part in get_args(kind) if part is not NoneType]
         return _bare(others[0]) if len(others) == 1 else kind
     return kind
-
-
-def _key(table: str, name: str, field: FieldInfo, meaning: str, example: object) -> Key:
-    found = _range(field.annotation) or next((entry for entry in field.metadata if isinstance(entry, Range)), None)
-    told = "" if found is None else f"{found.least:g} to {found.most:g}"
-    return Key(table, name, unit_of(name), _kind(field.annotation), told, _default(field), meaning, example)
 
 
 def _range(kind: Any) -> Range | None:

@@ -93,7 +93,13 @@ def _rows_of(section: CatalogueSection, stated: frozenset[str]) -> tuple[Rolling
     for estimate in estimates(section):
         full = with_estimate(full, estimate, estimate.value)
     row = _ball_row(full) if full.type.endswith("ball") else _roller_row(full)
-    return *_placed(full, row), *_ribs(full, row)
+    rows = _placed(full, row)
+    if full.ribs != "none" and isinstance(row, RollerRow):
+        # Ribs of cylindrical rollers are rows of their own, first those that hold the inner ring against +z.
+        length = si(full, "rib_contact_mm")
+        senses = {"+z": (1,), "-z": (-1,), "both": (1, -1)}[full.ribs]
+        rows += tuple(rib_row(row, sense, length) for sense in senses)
+    return rows
 
 
 def estimates(section: CatalogueSection) -> tuple[Estimate, ...]:
@@ -220,10 +226,6 @@ def _rib_contact(section: CatalogueSection) -> Estimate | None:
     return _scaled("rib_contact_mm", dimensions.RIB_CONTACT, _given(section, "element_diameter_mm"), "mm")
 
 
-def _osculation(section: CatalogueSection) -> Estimate:
-    return _scaled("osculation", dimensions.OSCULATION, 1.0, "")
-
-
 def _row_distance(section: CatalogueSection) -> Estimate | None:
     if section.arrangement != "single":
         distance = dimensions.PAIR_DISTANCE
@@ -261,7 +263,7 @@ _ESTIMATED: Mapping[str, Callable[[CatalogueSection], Estimate | None]] = {
     "contact_angle_deg": _contact_angle,
     "inner_groove_ratio": _groove("inner_groove_ratio"),
     "outer_groove_ratio": _groove("outer_groove_ratio"),
-    "osculation": _osculation,
+    "osculation": lambda section: _scaled("osculation", dimensions.OSCULATION, 1.0, ""),
     "row_distance_mm": _row_distance,
     "radial_clearance_mm": _radial_clearance,
     "axial_preload_um": _axial_preload,
@@ -362,15 +364,6 @@ def _placed(section: CatalogueSection, row: RollerRow | BallRow) -> tuple[Rollin
         return moved(row, -angle, -place), moved(row, angle, place)
     distance = si(section, "row_distance_mm") if rows > 1 else 0.0
     return tuple(moved(row, signed, (number - 0.5 * (rows - 1)) * distance) for number in range(rows))
-
-
-def _ribs(section: CatalogueSection, row: RollerRow | BallRow) -> tuple[RollerRow, ...]:
-    """Ribs of cylindrical rollers as rows of their own, first those that hold the inner ring against +z."""
-    if section.ribs == "none" or not isinstance(row, RollerRow):
-        return ()
-    length = si(section, "rib_contact_mm")
-    senses = {"+z": (1,), "-z": (-1,), "both": (1, -1)}[section.ribs]
-    return tuple(rib_row(row, sense, length) for sense in senses)
 
 
 # Catalogue load ratings, and the largest ratio of estimates to them

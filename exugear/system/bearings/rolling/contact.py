@@ -352,7 +352,13 @@ def equilibrium(
         raise BearingError(f"bearing: no row carries an axial force of {applied[2]:.6g} N")
     contacts = row_contacts(bearing.rows, first_roller_angle)
     displacement = _balance(contacts, applied, np.asarray(tilt, dtype=np.float64))
-    _check_shoulders(contacts, displacement, applied)
+    if contacts.balls is not None:
+        # Where a bearing has a contact angle, each groove has a shoulder on one side only, on which balls must lean.
+        state = ball_state(contacts.balls, displacement)
+        loaded = (state.approach > 0.0) & (contacts.balls.start[:, 1] != 0.0)
+        held = np.sign(contacts.balls.start[loaded, 1]) * state.direction[loaded, 1]
+        if np.any(held < LEAST_SHOULDER):
+            raise _no_equilibrium(applied)
     return bearing_state(contacts, displacement)
 
 
@@ -368,17 +374,6 @@ def _no_equilibrium(force: Floats) -> BearingError:
         f"bearing: no equilibrium with the force {force.tolist()} N; a single row with a contact angle requires an "
         "axial force above that induced by its radial load"
     )
-
-
-def _check_shoulders(contacts: RowContacts, displacement: Floats, force: Floats) -> None:
-    """Refuse balls on the side of a groove where a bearing with a contact angle has no shoulder."""
-    if contacts.balls is None:
-        return
-    state = ball_state(contacts.balls, displacement)
-    loaded = (state.approach > 0.0) & (contacts.balls.start[:, 1] != 0.0)
-    held = np.sign(contacts.balls.start[loaded, 1]) * state.direction[loaded, 1]
-    if np.any(held < LEAST_SHOULDER):
-        raise _no_equilibrium(force)
 
 
 def _balance(contacts: RowContacts, force: Floats, tilt: Floats) -> Floats:

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -108,16 +107,14 @@ def _read_user_element(path: Path) -> dict[str, LabelledMatrix]:
             f"{path}: no *MATRIX, TYPE=STIFFNESS or MASS; write *SUBSTRUCTURE MATRIX OUTPUT, OUTPUT FILE=USER DEFINED, "
             "STIFFNESS=YES, MASS=YES"
         )
-    labels = tuple(_labels_of_element(nodes, components))
-    return {name: LabelledMatrix(_triangle(entries, labels, path, name), labels) for name, entries in values.items()}
-
-
-def _labels_of_element(nodes: list[int], components: list[tuple[int, list[int]]]) -> Iterator[Label]:
     starts = dict(components)
     current: list[int] = []
+    order: list[Label] = []
     for count, node in enumerate(nodes, start=1):
         current = starts.get(count, current)
-        yield from ((node, component) for component in current)
+        order += ((node, component) for component in current)
+    labels = tuple(order)
+    return {name: LabelledMatrix(_triangle(entries, labels, path, name), labels) for name, entries in values.items()}
 
 
 def _triangle(values: list[float], labels: tuple[Label, ...], path: Path, name: str) -> Floats:

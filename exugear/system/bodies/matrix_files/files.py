@@ -103,12 +103,15 @@ def read_matrices(files: MatrixFiles) -> InterfaceMatrices:
     tables: list[tuple[Path, NodeTable]] = []
     matrices: dict[Kind, LabelledMatrix] = {}
     contents: dict[Path, tuple[dict[str, LabelledMatrix], tuple[str, ...], NodeTable | None]] = {}
+    # Of Nastran files only matrices of these names are read.
+    stated = files.names or {}
+    wanted = frozenset(name.upper() for kind in KINDS for name in ([stated[kind]] if kind in stated else NAMES[kind]))
     for kind in KINDS:
         path = files.file or (files.stiffness if kind == "stiffness" else files.mass)
         if path is None:
             raise MatrixFileError(f"no file for the {kind} matrix; set file, or both stiffness and mass")
         if path not in contents:
-            contents[path] = _read(path, _wanted(files))
+            contents[path] = _read(path, wanted)
         found, others, table = contents[path]
         matrices[kind] = _chosen(path, found, others, kind, files)
         if table is not None and table.positions:
@@ -151,12 +154,6 @@ def read_nodes(path: Path) -> NodeTable:
     if ending in PUNCH:
         return read_punch(path, frozenset())[2]
     raise MatrixFileError(f"{path}: unknown format of nodes; its name must end in {', '.join(NODE_ENDINGS)}")
-
-
-def _wanted(files: MatrixFiles) -> frozenset[str]:
-    """Names of the matrices that are read from Nastran files."""
-    stated = files.names or {}
-    return frozenset(name.upper() for kind in KINDS for name in ([stated[kind]] if kind in stated else NAMES[kind]))
 
 
 def _read(path: Path, wanted: frozenset[str]) -> tuple[dict[str, LabelledMatrix], tuple[str, ...], NodeTable | None]:

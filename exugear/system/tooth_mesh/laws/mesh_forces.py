@@ -303,15 +303,11 @@ def acting_table(meshes: MeshArrays) -> TableArrays | None:
     return None
 
 
-def _bundles(meshes: MeshArrays) -> tuple[MeshArrays, TableArrays | None]:
-    table = acting_table(meshes)
-    return cached_bundle(meshes), None if table is None else cached_bundle(table)
-
-
 def _pass(q: Floats, v: Floats, meshes: MeshArrays, states: Floats, f: Floats, jq: Floats, jv: Floats) -> None:
-    bundled, table = _bundles(meshes)
-    law_memory = None if table is None else bundle(scratch_memory())
-    pass_meshes(q, v, bundled, table, states, f, jq, jv, np.empty((MEMORY, ROW_SIZE)), law_memory)
+    given = acting_table(meshes)
+    table = None if given is None else cached_bundle(given)
+    law_memory = None if given is None else bundle(scratch_memory())
+    pass_meshes(q, v, cached_bundle(meshes), table, states, f, jq, jv, np.empty((MEMORY, ROW_SIZE)), law_memory)
 
 
 def add_mesh_forces(q: Floats, v: Floats, meshes: MeshArrays, f: Floats) -> None:

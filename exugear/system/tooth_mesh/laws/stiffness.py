@@ -108,8 +108,9 @@ def pack(
     moves = resists & (not averaged)
     ways = [e.load_ways if move else np.zeros((2, 0)) for move, e in zip(moves, elements, strict=True)]
     friction = [_NO_FRICTION] * count
-    if not (averaged or linear or tangent):
-        friction = [_friction(element) for element in elements]
+    for n, element in enumerate(elements):
+        if element.friction is not None and element.friction_coefficient and not (averaged or linear or tangent):
+            friction[n] = element.friction_coefficient * element.friction  # (3, n) per unit of the mesh force
     tables = pack_tables(elements, index, averaged, linear)
     if tangent:
         tables.nominal[:, NOMINAL_DEFLECTION] -= [element.rest for element in elements]
@@ -177,13 +178,6 @@ def _pack_ways(elements: tuple[MeshElement, ...], ways: list[Floats]) -> Floats:
             moment = element.load * (of_load - added)
             block[: added.size] = np.hstack([periodic_cubic(added), periodic_cubic(moment)])
     return coefficients
-
-
-def _friction(element: MeshElement) -> Floats:
-    """Friction over the mesh cycle, (3, n), per unit mesh force; empty without friction."""
-    if element.friction is None or element.friction_coefficient == 0.0:
-        return _NO_FRICTION
-    return element.friction_coefficient * element.friction
 
 
 def _pack_friction(parts: Sequence[Floats]) -> Floats:
