@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exugear.gearbox.units import RPM
+from exugear.gearbox.load_cases import operating_range
 from exugear.report.findings.context import Context
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.words import figure_text
@@ -22,8 +22,8 @@ CHECKED_RESONANCES = 10
 """Number of highest resonances that are checked."""
 MATCHED = 0.8
 """Minimum fraction of the highest resonances that should match a mode."""
-BEYOND_RATED = 1.3
-"""Ratio to the rated speed above which the page warns of speeds beyond it."""
+BEYOND_OPERATION = 1.05
+"""Ratio to the highest operating speed above which the page warns of speeds beyond it."""
 
 
 @dataclass(frozen=True)
@@ -65,12 +65,14 @@ def validity_checks(context: Context, group: RunGroup) -> tuple[Finding, ...]:
         text = f"one of {len(sets)} inertia sets ({', '.join(sets)}) is used; compare the others"
         findings.append(Finding("warning", text))
     findings += [Finding("warning", text) for text in excitation_warnings(context.gearbox)]
-    rated = case.operation.rated_speed_rpm
-    fastest = float(run.spectra.speed.max()) / RPM
-    if rated is None:
+    if case.operation.rated_speed_rpm is None:
         findings.append(Finding("warning", "no rated speed; set rated_speed_rpm in [operation]"))
-    elif fastest > BEYOND_RATED * rated:
-        text = f"the highest computed speed is {figure_text(fastest / rated, 2)} times the rated speed"
+    operation = operating_range(context.gearbox)
+    fastest = float(run.spectra.speed.max())
+    if operation is not None and fastest > BEYOND_OPERATION * operation[1]:
+        text = (
+            f"the highest computed speed is {figure_text(fastest / operation[1], 2)} times the highest operating speed"
+        )
         findings.append(Finding("warning", f"{text}; speeds outside the operating range are not ranked"))
     return tuple(sorted(findings, key=lambda own: not own.passed))
 
@@ -80,20 +82,19 @@ def _check_resonances(group: RunGroup) -> list[Finding]:
     if not loudest:
         return []
     count = len(loudest)
-    steady = sum(own.steady for own in loudest)
     findings: list[Finding] = []
     if not group.responses:
-        passed = steady == count
-        found = _fraction(steady, count, passed)
-        findings.append(check_finding(passed, f"{found} are found with all window lengths"))
+        steady = sum(own.steady for own in loudest)
+        findings.append(share_check(steady, count, steady == count, "found with all window lengths"))
     if group.runs[group.main].modes is None and not group.responses:
         return [*findings, Finding("warning", "no modes computed; run exugear modes for mode shapes")]
     matched = sum(bool(own.finding.mode_name) for own in loudest)
-    passed = matched >= MATCHED * count
-    return [*findings, check_finding(passed, f"{_fraction(matched, count, passed)} are at the frequency of a mode")]
+    return [*findings, share_check(matched, count, matched >= MATCHED * count, "at the frequency of a mode")]
 
 
-def _fraction(number: int, count: int, passed: bool) -> str:
-    """Return how many of the highest resonances a check found, as text."""
-    found = f"{number} of the {count} highest resonances"
-    return found if passed else f"only {found}"
+def share_check(number: int, count: int, passed: bool, what: str) -> Finding:
+    """Return the check of how many of the highest resonances are `what`."""
+    if count == 1:
+        return check_finding(passed, f"the highest resonance is {'' if number else 'not '}{what}")
+    only = "" if passed else "only "
+    return check_finding(passed, f"{only}{number} of the {count} highest resonances are {what}")

@@ -17,7 +17,9 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.units import RPM
 from exugear.report.findings.resonance_list import MOST_INSIDE
+from exugear.report.findings.result_checks import share_check
 from exugear.report.writer import write_report
 from exugear.results.folder import keep_case, modes_path
 from exugear.steady.settings import SpeedRange, SteadySettings
@@ -85,6 +87,34 @@ def test_a_higher_peak_outside_the_operating_range_does_not_lead(folder, told, t
     outside = next(line for line in report.statements if line.startswith("Just outside the range"))
     amplitude = re.search(r"bearing force ±(\d+)", outside)
     assert amplitude and float(amplitude[1]) > 0.1 * told["resonances"][0]["force_N"]
+
+
+@pytest.mark.parametrize(
+    ("number", "count", "passed", "said"),
+    [
+        (9, 10, True, "Passed: 9 of the 10 highest resonances are at a mode"),
+        (3, 10, False, "Warning: only 3 of the 10 highest resonances are at a mode"),
+        (1, 1, True, "Passed: the highest resonance is at a mode"),
+        (0, 1, False, "Warning: the highest resonance is not at a mode"),
+    ],
+)
+def test_checks_of_resonances_are_sentences(number, count, passed, said):
+    assert share_check(number, count, passed, "at a mode").line == said
+
+
+@pytest.mark.validation
+@pytest.mark.parametrize(("highest", "warns"), [(27.625, True), (60.0, False)])
+def test_speeds_beyond_the_operating_range_are_a_warning(folder, tmp_path, monkeypatch, highest, warns):
+    """The response reaches 35 rpm."""
+    shutil.copytree(folder, tmp_path / "other")
+    monkeypatch.setattr("exugear.report.writer.model_variations", lambda *arguments: ())
+    monkeypatch.setattr(
+        "exugear.report.findings.result_checks.operating_range", lambda gearbox: (1.0 * RPM, highest * RPM)
+    )
+    statements = write_report(tmp_path / "other").statements
+    said = [line for line in statements if "the highest computed speed is" in line]
+    assert bool(said) == warns
+    assert all("1.3 times the highest operating speed" in line for line in said)
 
 
 @pytest.mark.validation
