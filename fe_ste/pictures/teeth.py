@@ -185,8 +185,6 @@ def _render_contact(
     size: tuple[int, int],
 ) -> tuple[Pixels, float]:
     """Picture and size of its pixels; pressure in MPa."""
-    import pyvista
-
     direction, upward = _view_on_contact(quads, pressure, pinion.points)
     with offscreen_plotter(*size) as plotter:
         for body, colour, opacity in ((pinion, PINION_COLOUR, 1.0), (gear, GEAR_COLOUR, 0.12)):
@@ -196,8 +194,7 @@ def _render_contact(
             plotter.add_mesh(edges, color="#444444", line_width=1.5, opacity=0.5 + 0.5 * opacity)
         # Towards the eye by next to nothing, so that the cells are not lost in the flank below them.
         lift = 2e-3 * float(np.ptp(pinion.points, axis=0).max()) * direction
-        faces = np.column_stack([np.full(len(quads), 4), np.arange(4 * len(quads)).reshape(-1, 4)])
-        patch = pyvista.PolyData((quads + lift).reshape(-1, 3), faces=faces.ravel())
+        patch = _quad_surface(quads + lift)
         patch.cell_data["pressure"] = pressure
         _add_unlit(plotter, patch, "pressure", top, _PRESSURE_MAP)
         focus = quads.mean(axis=(0, 1))
@@ -227,6 +224,13 @@ def _add_unlit(
 ) -> None:
     """Add a mesh in the colours of its values from zero to `top`, not shaded by light."""
     plotter.add_mesh(mesh, scalars=name, clim=(0.0, top), cmap=colours, lighting=False, show_scalar_bar=False)
+
+
+def _quad_surface(quads: Floats) -> pyvista.PolyData:
+    import pyvista
+
+    faces = np.column_stack([np.full(len(quads), 4), np.arange(4 * len(quads)).reshape(-1, 4)])
+    return pyvista.PolyData(quads.reshape(-1, 3), faces=faces.ravel())
 
 
 def _view_on_contact(quads: Floats, pressure: Floats, body: Floats) -> tuple[Floats, Floats]:
