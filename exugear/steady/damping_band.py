@@ -65,7 +65,9 @@ class DampingBand:
         }
 
 
-def damping_band(model: HarmonicBalanceModel, method: Method, speed: Floats, amplitude: SingleComplexes) -> DampingBand:
+def damping_band(
+    model: HarmonicBalanceModel, method: Method, speed: Floats, amplitude: SingleComplexes, jumps: Booleans
+) -> DampingBand:
     """Solve the highest peaks of a response again with the lowest and the highest plausible damping.
 
     Parameters
@@ -74,9 +76,11 @@ def damping_band(model: HarmonicBalanceModel, method: Method, speed: Floats, amp
     method : ``linear`` or ``parametric``
     speed : (points,) of the overall input, rad/s, ascending
     amplitude : (points, lines, signals) of the response, of line 0 the mean
+    jumps : (points,) points beside a jump of the response, which are no peaks
     """
     quantities = model.quantities
-    point, line, rises = _highest_peaks(model, quantities, speed, amplitude)
+    counted = in_operation(speed, operating_range(model.waves.assembly.gearbox)) & ~jumps
+    point, line, rises = _highest_peaks(quantities, amplitude, counted)
     found = np.zeros((len(point), len(quantities), 2))
     respond = {"linear": linear_response, "parametric": parametric_response}[method]
     ends = damping_limits(model.system)
@@ -187,19 +191,18 @@ def damping_limits(system: MeanSystem) -> tuple[MeanSystem, MeanSystem]:
 
 
 def _highest_peaks(
-    model: HarmonicBalanceModel, quantities: tuple[Quantity, ...], speed: Floats, amplitude: SingleComplexes
+    quantities: tuple[Quantity, ...], amplitude: SingleComplexes, counted: Booleans
 ) -> tuple[Integers, Integers, Booleans]:
     """Points (k,) and lines (k,) of the highest peaks of any quantity, and which quantities (k, s) have one there.
 
-    Within the operating range, where the file has one and the response reaches it.
+    Peaks count at the points that are `counted`.
     """
-    inside = in_operation(speed, operating_range(model.waves.assembly.gearbox))
     chosen: set[tuple[int, int]] = set()
     of_quantity: list[set[tuple[int, int]]] = []
     for quantity in quantities:
         size = quantity.sizes(amplitude[:, 1:]).max(axis=2)
         of_quantity.append(set(peaks_of_lines(size)))
-        chosen |= set(quantity.peaks(size, inside[:, None])[:MOST_PEAKS])
+        chosen |= set(quantity.peaks(size, counted[:, None])[:MOST_PEAKS])
     ordered = sorted(chosen)
     rises = np.array([[peak in peaks for peaks in of_quantity] for peak in ordered], dtype=bool)
     point, line = np.array(ordered, dtype=np.int64).reshape(-1, 2).T

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from exugear.steady.harmonics.branches import standing_peaks
+from exugear.steady.harmonics.branches import beside_jumps, standing_peaks
 from exugear.steady.mean_system.planet_sets import SteadyError
 from fe_ste.tools.arrays import Complexes, Floats, Integers
 
@@ -84,7 +84,13 @@ def peaks(data: xr.Dataset, signal: str = "overall_dte", least: float = 0.01) ->
     values: Floats = data["amplitude"].to_numpy()[:, 1:, names.index(signal)].astype(np.float64)
     speed: Floats = data["speed"].to_numpy()
     floor = least * values.max(initial=0.0)
-    highest = [(point, line) for line, own in enumerate(values.T) for point in _tops(own) if own[point] >= floor]
+    jumps = beside_jumps(data["loads_at_mean_angles"].to_numpy() == 1)
+    highest = [
+        (point, line)
+        for line, own in enumerate(values.T)
+        for point in _tops(own)
+        if own[point] >= floor and not jumps[point]
+    ]
     bases = tuple(str(name) for name in data["base"].to_numpy())
     index = data["index"].to_numpy()
     orders = data["order"].to_numpy()

@@ -34,7 +34,7 @@ from exugear.steady.crossings import (
     with_crossings,
 )
 from exugear.steady.damping_band import DampingBand, damping_band, no_band
-from exugear.steady.harmonics.branches import Scales, standing_peaks, trace
+from exugear.steady.harmonics.branches import Scales, beside_jumps, standing_peaks, trace
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
 from exugear.steady.harmonics.lines import LineSet
 from exugear.steady.mean_system.mean_system import Steps
@@ -193,8 +193,8 @@ class SolvedPoints:
     growth: Floats
     """(points,) largest growth rate of a disturbance, 1/s, on a continuation and with contact loss; NaN elsewhere."""
     mean_angles: Booleans
-    """(points,) whether stated loads are at the angles of the mean speed because they did not settle at those that the
-    vibration gives their bodies, with the method `nonlinear`."""
+    """(points,) whether positions in the mesh cycles or, with the method `nonlinear`, stated loads are at the angles of
+    the mean speed, because the vibration turns their bodies too far."""
     remark: Texts
     """(points,) what is to be said of a point, or why there is none: its numbers are NaN then."""
 
@@ -391,7 +391,8 @@ def response_of(
         explained.append((crossing.line, contributions(frozen, speed, crossing.line)))
     band = no_band(tuple(quantity.name for quantity in linear.quantities))
     if settings.method != "nonlinear" and not linear.loses_contact:
-        band = damping_band(linear, settings.method, solved.speed, solved.amplitude)
+        jumps = beside_jumps(solved.mean_angles)
+        band = damping_band(linear, settings.method, solved.speed, solved.amplitude, jumps)
     growth = solver.growth(float(even.min()), float(even.max()))
     return SteadyResponse(
         assembly=model.waves.assembly,
@@ -486,7 +487,10 @@ def _with_tops(
         audible = None
         if model.radiated is not None:
             audible = line_frequencies(speed, model.lines.orders) <= model.radiated.limit
-        return ResponseCurves(speed, points.amplitude[order], smooth, model.quantities, operation, damping, audible)
+        jumps = beside_jumps(points.mean_angles[order])
+        return ResponseCurves(
+            speed, points.amplitude[order], smooth, jumps, model.quantities, operation, damping, audible
+        )
 
     for missed in (partial(missed_tops, known=tops, count=loudest), missed_flanks):
         for _ in range(ROUNDS):
@@ -646,7 +650,7 @@ def _fill(out: SolvedPoints, n: int, model: HarmonicBalanceModel, response: Resp
     out.apart[n] = response.apart
     out.free[n] = response.free
     loads = response.interface.loads
-    out.mean_angles[n] = loads is not None and loads.at_mean_angles
+    out.mean_angles[n] = response.at_mean_angles or (loads is not None and loads.at_mean_angles)
     least = max(RESOLVED * exchanged_power(response), 1e-300)
     deflections = np.abs(response.deflection)
     nothing_loads = loads is None or not loads.motion[1:].any()

@@ -56,6 +56,8 @@ class ResponseCurves:
     """(n, lines, signals), the mean as the first line."""
     smooth: Booleans
     """(n,) where the response is smooth over speed: not with contact loss."""
+    jumps: Booleans
+    """(n,) points beside a jump, see `exugear.steady.harmonics.branches.beside_jumps`."""
     quantities: Sequence[Quantity]
     """Quantities whose peaks are evaluated."""
     operation: tuple[float, float] | None
@@ -69,6 +71,15 @@ class ResponseCurves:
     def inside(self) -> Booleans:
         """(n,) which speeds are in operation."""
         return in_operation(self.speed, self.operation)
+
+    @property
+    def ranked(self) -> Booleans:
+        """(n, 1) where peaks are ranked."""
+        return (self.inside & ~self.jumps)[:, None]
+
+    def is_smooth(self, points: slice) -> bool:
+        """Return whether a curve goes through points that follow each other."""
+        return bool(self.smooth[points].all()) and not self.jumps[points].any()
 
     def sizes(self, quantity: Quantity) -> Floats:
         """Return the amplitudes (n, lines - 1, places) of a quantity, zero where it is not ranked."""
@@ -87,7 +98,7 @@ class ResponseCurves:
         alike: dict[tuple[int, int, int], list[Peak]] = {}
         for point, line in peaks:
             around = _around(point, len(self.speed))
-            if self.smooth[around].all():
+            if self.is_smooth(around):
                 place, before = int(sizes[point, line].argmax()), point - around.start
                 key = keys[point, line] = quantity.name, line, place, before, self.speed[around].tobytes()
                 if key not in known:
@@ -156,7 +167,7 @@ def higher_between(curves: ResponseCurves, known: KnownTops) -> tuple[HigherBetw
     for quantity in curves.quantities if len(curves.speed) >= NEIGHBOURS else ():
         sizes = curves.sizes(quantity)
         highest = sizes.max(axis=2)
-        ranked = quantity.peaks(highest, curves.inside[:, None])[:PREDICTED]
+        ranked = quantity.peaks(highest, curves.ranked)[:PREDICTED]
         tops = curves.tops(quantity, sizes, ranked, known)
         excess = np.array([tops[peak][1] / highest[peak] - 1.0 if peak in tops else 0.0 for peak in ranked])
         if (noticed := np.flatnonzero(excess > NOTICED)).size:
@@ -187,8 +198,8 @@ def missed_flanks(curves: ResponseCurves) -> Floats:
     more: list[float] = []
     for quantity in curves.quantities:
         sizes = curves.sizes(quantity).max(axis=2)
-        for point, line in quantity.peaks(sizes, curves.inside[:, None])[:DRAWN]:
-            if curves.smooth[_around(point, len(speed))].all():
+        for point, line in quantity.peaks(sizes, curves.ranked)[:DRAWN]:
+            if curves.is_smooth(_around(point, len(speed))):
                 for side in (slice(point, None), slice(point, None, -1)):
                     more += _on_flank(speed[side], sizes[side, line])
     taken = list(speed)

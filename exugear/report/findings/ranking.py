@@ -20,7 +20,7 @@ from exugear.gearbox.units import RPM
 from exugear.results.findings import Finding
 from exugear.results.spectra.line_spectra import LineSpectra, line_spectra
 from exugear.results.spectra.waterfall import OrderLine
-from exugear.steady.harmonics.branches import standing_peaks
+from exugear.steady.harmonics.branches import beside_jumps, standing_peaks
 from exugear.steady.mean_system.signals import ROUND_OFF, Quantity, vector_peak
 from exugear.steady.peaks import SWEEP_SHIFT
 from exugear.steady.settings import METHODS
@@ -221,13 +221,14 @@ def ranking_of(data: xr.Dataset, speeds: tuple[float, float] | None = None, want
     speed = np.abs(signed)
     low, high, whole = _range(json.loads(str(data.attrs["operating_range"])) if speeds is None else speeds, speed)
     inside = (speed >= low) & (speed <= high)
+    jumps = beside_jumps(data["loads_at_mean_angles"].to_numpy() == 1)
     amplitude = complex_amplitudes(data)[:, 1:]
     quantities = response_quantities(data)
     first, reason = deciding_quantity([quantity.name for quantity in quantities], wanted)
     sizes = {quantity.name: quantity.sizes(amplitude) for quantity in quantities}
     peaks = {}
     for quantity in quantities:
-        counted = inside[:, None]
+        counted = (inside & ~jumps)[:, None]
         if quantity.name == SOUND:  # above the band of the housing no peak counts
             counted = counted & np.isfinite(data["sound_power"].to_numpy()[:, 1:])
         peaks[quantity.name] = quantity.peaks(sizes[quantity.name].max(axis=2), counted)

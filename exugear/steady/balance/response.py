@@ -59,7 +59,8 @@ POSITIONS_REPEATED = 2
 LARGEST_SHIFT = 0.1
 """Motion of a position, mesh cycles, above which forces are not linear in it: it is neglected there.
 
-Near standstill a stated torque turns the free gear train that far."""
+Near standstill stated torques and eccentric gears, whose mesh forces have varying levers, turn the free gear train that
+far."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +85,9 @@ class Response:
     """(b,) share of time in which no rolling element of a non-linear bearing touches, by law."""
     of_bearings: Complexes
     """(n, c) forces along coordinates of the bearings that vary with the carrier, beyond the averaged system."""
+    at_mean_angles: bool = False
+    """Whether positions in the mesh cycles are those of the mean speed, because they move by more than
+    `LARGEST_SHIFT`."""
 
     @cached_property
     def motion(self) -> Complexes:
@@ -209,14 +213,15 @@ class SlowChanges:
             constants = _products_of_constants(self._model, given, ports, self._speed, everywhere)
         return flat(functions.at(ports, self._speed)), constants
 
-    def forces(self, deflections: Complexes, motion: Complexes) -> Complexes:
-        """Find the forces (n, m, f) at deflections (n, m) and a motion (n, size) about the static state, N."""
+    def positions(self, motion: Complexes) -> Complexes:
+        """Return how far a motion (n, size) about the static state moves the positions (q, m), mesh cycles."""
+        return np.asarray(motion[self._lines] @ self._rows)
+
+    def forces(self, deflections: Complexes, positions: Complexes) -> Complexes:
+        """Find the forces (n, m, f), N, at deflections (n, m) and `positions` (q, m)."""
         found = np.zeros(self._shape, dtype=complex)
         along = found.copy()
         along[..., DEFLECTION] = deflections - self._model.deviations(self._speed)
-        positions = motion[self._lines] @ self._rows
-        if (2.0 * np.abs(positions)).sum(axis=0).max(initial=0.0) > LARGEST_SHIFT:
-            return found
         found[..., DEFLECTION] = self._modulated(positions, along, self._by_position)
         if self._by_deflection is not None:
             slow = along[self._lines, :, DEFLECTION]
@@ -289,6 +294,7 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
     moved = np.zeros_like(given)
     slow = SlowChanges(model, interface) if repeated else None
     found = None
+    too_far = False
     products = 0
     for again in reversed(range(1 + (POSITIONS_REPEATED if repeated else 0))):
         whole = np.hstack([(given + moved).reshape(shape[0], -1), of_bearings])
@@ -305,13 +311,15 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
             if 2.0 * change**2 < TOLERANCE:
                 break
         if again and slow is not None:
-            moved = slow.forces(deflection, _motion(interface, excess))
+            positions = slow.positions(_motion(interface, excess))
+            too_far = bool((2.0 * np.abs(positions)).sum(axis=0).max(initial=0.0) > LARGEST_SHIFT)
+            moved = np.zeros_like(given) if too_far else slow.forces(deflection, positions)
         if again and model.varying:
             response = _response(model, interface, deflection, excess, products)
             shifted = at_mean_positions(model, interface, response)
             balance = LineBalance(model, shifted, answers, lengths, passing)
             given = given_forces(model, shifted) + deviation_forces(model, shifted, passing)
-    return _response(model, interface, deflection, excess, products)
+    return replace(_response(model, interface, deflection, excess, products), at_mean_angles=too_far)
 
 
 class LineBalance:

@@ -286,6 +286,18 @@ def standing_peaks(values: Floats, stands: float = STANDS) -> Integers:
     return found[:count]
 
 
+def beside_jumps(kinds: Booleans) -> Booleans:
+    """Return which points (n,) follow or precede one of another kind, where a curve over them jumps.
+
+    Examples
+    --------
+    >>> beside_jumps(np.array([True, True, False, False, False])).tolist()
+    [False, True, True, False, False]
+    """
+    changes = kinds[1:] != kinds[:-1]
+    return np.asarray(np.append(changes, False) | np.append(False, changes))
+
+
 def peaks_of_lines(sizes: Floats, stands: float = STANDS) -> list[tuple[int, int]]:
     """Return point and line of the `standing_peaks` of all amplitudes (points, lines), line by line."""
     return [(int(point), line) for line, own in enumerate(sizes.T) for point in standing_peaks(own, stands)]

@@ -219,12 +219,12 @@ def test_lines_that_are_left_out_at_a_peak_hardly_change_its_range_of_damping(so
     amplitude = np.array([signals(solver.model, solver.response(own)) for own in speed]).astype(np.complex64)
     amplitude[:, 1:] *= 2.0
     monkeypatch.setattr(damping_band, "MOST_PEAKS", 3)
-    found = damping_band.damping_band(solver.model, "parametric", speed, amplitude)
+    found = damping_band.damping_band(solver.model, "parametric", speed, amplitude, np.zeros(len(speed), dtype=bool))
     point = found.point[0]
     few = damping_band.with_relevant_lines(solver.model, amplitude[point], found.line[found.point == point])
     assert len(few.lines.orders) < 0.8 * len(solver.model.lines.orders)
     monkeypatch.setattr(damping_band, "with_relevant_lines", lambda model, *_: model)
-    whole = damping_band.damping_band(solver.model, "parametric", speed, amplitude)
+    whole = damping_band.damping_band(solver.model, "parametric", speed, amplitude, np.zeros(len(speed), dtype=bool))
     errors = np.abs(found.amplitude / whole.amplitude - 1.0)
     counted = whole.amplitude > 0.01 * whole.amplitude.max(axis=0)
     assert errors[counted].max() < 0.03

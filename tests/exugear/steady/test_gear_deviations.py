@@ -9,12 +9,14 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.report.findings.ranking import ranking_of
 from exugear.steady.balance.response import dissipated_and_given, signals
+from exugear.steady.findings import response_findings
 from exugear.steady.mean_system.mesh_places import DEFLECTION
 from exugear.steady.peaks import line_name
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.settling import SettlingRun
-from exugear.steady.steady_file import to_dataset
+from exugear.steady.steady_file import to_dataset, with_names
 from exugear.steady.steady_response import response_of
 from exugear.system.build import assemble
 from exugear.system.tooth_mesh.element import MeshCurve
@@ -30,6 +32,7 @@ BOTH = {
     "two": {"body": "shaft_2", "cumulative_pitch_um": 3 * PITCH},
 }
 SPEEDS = (50.0, 150.0)
+SIDEBAND = "helical + rotation of output"
 
 
 def spur_assembly(bend=None, **deviations):
@@ -148,6 +151,38 @@ def test_lines_of_round_off_ask_for_no_speeds():
     both = [np.abs(response.solved.amplitude[:, :, 0]) for response in found.values()]
     assert both[0].max() > 1e-6
     np.testing.assert_allclose(both[1], both[0], atol=1e-6 * both[0].max())
+
+
+def test_sidebands_left_out_near_standstill_are_told_and_their_jump_is_no_resonance():
+    """Mesh forces on eccentric gears turn the free pair by more than a tenth of a mesh cycle below 27 rad/s.
+
+    Thirty speeds had been added for the jump of the sidebands, which were to be 3785 times as high between them.
+    """
+    content = gear_trains.pair() | {
+        "deviations": {
+            "in": {"body": "input", "gear": "small", "runout_um": 15.0},
+            "out": {"body": "output", "gear": "large", "runout_um": 15.0},
+        }
+    }
+    gearbox = Gearbox.from_dict(content)
+    assembly = assemble(gearbox, Choice("rigid"), dict.fromkeys(gearbox.pairs, 3e8 * SHAPE))
+    found = {}
+    for method in ("parametric", "nonlinear"):
+        response = response_of(assembly, SteadySettings(SpeedRange(20.0, 90.0, 13), method, harmonics=3))
+        data = found[method] = with_names(to_dataset(response))
+        assert not any(own.quantity == "error" and own.rank == 1 for own in response.higher_between)
+        told = [own for own in response_findings(data) if own.text.startswith("positions in the mesh cycle of")]
+        assert [own.level for own in told] == (["warning"] if method == "parametric" else [])
+    data = found["parametric"]
+    assert data.sizes["point"] == 13 and data["loads_at_mean_angles"].values.tolist() == [1, 1] + 11 * [0]
+    assert not ranking_of(data).resonances
+    # The method `nonlinear` has them at all speeds: it is what the warning advises.
+    sidebands = {
+        method: data["amplitude"].sel(signal="overall_dte")[:, list(data["line"].values).index(SIDEBAND)].values
+        for method, data in found.items()
+    }
+    assert sidebands["parametric"][0] < 1e-9 < 1e-7 < sidebands["parametric"][2]
+    assert sidebands["nonlinear"][0] > sidebands["parametric"][2]
 
 
 @pytest.mark.validation
