@@ -169,18 +169,17 @@ def _speeds(data: xr.Dataset) -> Iterator[Finding]:
         text = f"no steady state found at {len(missing)} speeds (blank in the diagrams), first {first}"
         yield Finding("warning", text, len(missing))
     if (at := np.abs(data["speed"].to_numpy()[data["loads_at_mean_angles"].to_numpy() == 1])).size:
-        shown = ", ".join(_rpm(speed) for speed in at[:SHOWN_SPEEDS])
-        more = f" and {at.size - SHOWN_SPEEDS} more" if at.size > SHOWN_SPEEDS else ""
         if data.attrs["method"] == "nonlinear":
+            shown = ", ".join(_rpm(speed) for speed in at[:SHOWN_SPEEDS])
+            more = f" and {at.size - SHOWN_SPEEDS} more" if at.size > SHOWN_SPEEDS else ""
             text = f"excitations at the angles of the mean speed, without the vibration, at {shown}{more}: they turn "
-            text += (
-                "their bodies too far to settle, so sums and differences of their orders are missing there; add the "
-            )
-            text += "inertia of the connected machines, raise the lowest speed, or use exugear run"
+            text += "their bodies too far to settle, so sums and differences of their orders are missing there"
+            remedy = "use exugear run"
         else:
             text = f"positions in the mesh cycle of the mean speed, without the vibration, up to {_rpm(at.max())}: it "
-            text += "moves them by over a tenth of a cycle, so sidebands of mesh orders are missing there; add the "
-            text += "inertia of the connected machines, raise the lowest speed, or use --method nonlinear"
+            text += "moves them by over a tenth of a cycle, so sidebands of mesh orders are missing there"
+            remedy = "use --method nonlinear"
+        text += f"; add the inertia of the connected machines, raise the lowest speed, or {remedy}"
         operation = json.loads(str(data.attrs["operating_range"]))
         inside = operation is None or bool(((at >= operation[0]) & (at <= operation[1])).any())
         yield Finding("warning" if inside else "note", text, at.size)
