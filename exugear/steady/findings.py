@@ -14,7 +14,7 @@ from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.results.findings import Finding, check_finding
 from exugear.results.sound.over_speed import sound_over_speed
-from exugear.steady.mean_system.signals import RELATIVE_ROUND_OFF, ROUND_OFF, SIGNALS
+from exugear.steady.mean_system.signals import SIGNALS, round_off
 from exugear.steady.peaks import (
     STRAINED,
     bearing_swings,
@@ -129,7 +129,7 @@ def _varies(data: xr.Dataset, quantity: str) -> bool:
     places = [n for n, name in enumerate(data["signal"].to_numpy()) if str(name).split(" ", maxsplit=1)[0] == signal]
     amplitude = data["amplitude"].to_numpy()[:, :, places]
     static = float(amplitude[:, 0].max(initial=0.0))
-    return bool((amplitude[:, 1:] > max(ROUND_OFF[quantity], RELATIVE_ROUND_OFF * static)).any())
+    return bool((amplitude[:, 1:] > round_off(quantity, static)).any())
 
 
 def _load_sharing(data: xr.Dataset) -> dict[str, float]:

@@ -40,7 +40,7 @@ from exugear.steady.harmonics.lines import LineSet
 from exugear.steady.mean_system.mean_system import Steps
 from exugear.steady.mean_system.mesh_places import DEFLECTION
 from exugear.steady.mean_system.planet_sets import SteadyError
-from exugear.steady.mean_system.signals import SURFACE_VELOCITY, SignalName
+from exugear.steady.mean_system.signals import SURFACE_VELOCITY, SignalName, round_off
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.settings import (
     SteadySettings,
@@ -318,7 +318,7 @@ KEPT_AT_MOST = 30.0
 """Time between two writes of the points that are solved, over the time of a write."""
 RESOLVED = 1e-4
 """Share of the exchanged power below which dissipated power is round-off."""
-ROUND_OFF = 1e-12
+STILL = 1e-12
 """Share of the largest deflection of a mesh below which vibration is round-off."""
 Kept = Callable[[SolvedPoints], None]
 
@@ -578,13 +578,14 @@ def _change_with_more(solver: PointSolver, solved: SolvedPoints) -> float:
         peaks = standing_peaks(values[:, line])
         found += [(int(point), line) for point in (peaks if peaks.size else [np.argmax(values[:, line])])]
     found.sort(key=lambda peak: -values[peak])
+    least = round_off("error", float(values[found[0]]) if found else 0.0)
     changes = [0.0]
-    for point, line in found[:CHECKED]:
+    for point, line in (peak for peak in found[:CHECKED] if values[peak] > least):
         place, _ = other.model.lines.find(model.lines.index[line])
         with suppress(HarmonicBalanceError):
             response = other.response(float(solved.speed[point]))
             amplitude = 2.0 * abs(complex(signals(other.model, response)[int(place), 0]))
-            changes.append(abs(amplitude / max(float(values[point, line]), 1e-300) - 1.0))
+            changes.append(abs(amplitude / float(values[point, line]) - 1.0))
     return max(changes)
 
 
@@ -654,6 +655,6 @@ def _fill(out: SolvedPoints, n: int, model: HarmonicBalanceModel, response: Resp
     least = max(RESOLVED * exchanged_power(response), 1e-300)
     deflections = np.abs(response.deflection)
     nothing_loads = loads is None or not loads.motion[1:].any()
-    if nothing_loads and deflections[1:].max(initial=0.0) <= ROUND_OFF * deflections.max(initial=0.0):
+    if nothing_loads and deflections[1:].max(initial=0.0) <= STILL * deflections.max(initial=0.0):
         return  # nothing excites: powers of round-off do not balance
     out.energy_error[n] = (taken - given) / max(abs(taken), abs(given), least)

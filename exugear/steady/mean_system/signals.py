@@ -322,7 +322,7 @@ class Quantity:
         counts = np.broadcast_to(counted, sizes.shape)
         found = [peak for peak in peaks_of_lines(sizes, prominence) if counts[peak]]
         found.sort(key=lambda peak: -sizes[peak])
-        least = max(ROUND_OFF[self.name], RELATIVE_ROUND_OFF * sizes[found[0]]) if found else 0.0
+        least = round_off(self.name, float(sizes[found[0]])) if found else 0.0
         return [peak for peak in found if sizes[peak] > least]
 
 
@@ -345,6 +345,11 @@ ROUND_OFF = {
 RELATIVE_ROUND_OFF = 1e-6
 """Share of the highest peak of a quantity up to which a peak may come from the accuracy of the solution: the harmonic
 balance of forces in time is solved to 1e-8 of the static deflections."""
+
+
+def round_off(quantity: str, highest: float) -> float:
+    """Return the amplitude of a quantity up to which nothing vibrates, where its highest one is known."""
+    return max(ROUND_OFF[quantity], RELATIVE_ROUND_OFF * highest)
 
 
 def quantities_of(names: Sequence[str], mounts: Collection[str]) -> tuple[Quantity, ...]:

@@ -153,6 +153,12 @@ def test_lines_of_round_off_ask_for_no_speeds():
     np.testing.assert_allclose(both[1], both[0], atol=1e-6 * both[0].max())
 
 
+def test_orders_of_nothing_do_not_change_with_more_harmonics():
+    """The method `linear` has no sidebands: their change had been 100 % of nothing."""
+    settings = SteadySettings(SpeedRange(50.0, 150.0, 12), "linear", harmonics=3, at_resonances=False)
+    assert response_of(spur_assembly(one=RUN_OUT), settings).change_with_more < 0.01
+
+
 def test_sidebands_left_out_near_standstill_are_told_and_their_jump_is_no_resonance():
     """Mesh forces on eccentric gears turn the free pair by more than a tenth of a mesh cycle below 27 rad/s.
 
