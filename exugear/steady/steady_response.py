@@ -482,7 +482,9 @@ def _with_tops(
         """Return the response over the speeds that are solved."""
         is_solved = np.flatnonzero(np.isfinite(points.drive_torque))
         order = is_solved[np.argsort(points.speed[is_solved], kind="stable")]
-        smooth = np.asarray(~(points.apart.any(axis=1) | points.free.any(axis=1)))[order]
+        # Loads that do not settle may have several states.
+        kinks = points.apart.any(axis=1) | points.free.any(axis=1) | (points.mean_angles & model.is_nonlinear)
+        smooth = np.asarray(~kinks)[order]
         speed = points.speed[order]
         audible = None
         if model.radiated is not None:

@@ -55,7 +55,7 @@ class ResponseCurves:
     amplitude: SingleComplexes
     """(n, lines, signals), the mean as the first line."""
     smooth: Booleans
-    """(n,) where the response is smooth over speed: not with contact loss."""
+    """(n,) where the response is smooth over speed: not with contact loss, nor where stated loads do not settle."""
     jumps: Booleans
     """(n,) points beside a jump, see `exugear.steady.harmonics.branches.beside_jumps`."""
     quantities: Sequence[Quantity]
