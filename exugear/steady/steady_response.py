@@ -198,6 +198,11 @@ class SolvedPoints:
     remark: Texts
     """(points,) what is to be said of a point, or why there is none: its numbers are NaN then."""
 
+    @property
+    def jumps(self) -> Booleans:
+        """(points,) points beside one with other angles, where the response over speed jumps; speeds ascend."""
+        return beside_jumps(self.mean_angles)
+
     def part(self, which: slice | Booleans | Integers) -> SolvedPoints:
         """Take some of the points."""
         return SolvedPoints(**{field.name: getattr(self, field.name)[which] for field in fields(self)})
@@ -391,8 +396,7 @@ def response_of(
         explained.append((crossing.line, contributions(frozen, speed, crossing.line)))
     band = no_band(tuple(quantity.name for quantity in linear.quantities))
     if settings.method != "nonlinear" and not linear.loses_contact:
-        jumps = beside_jumps(solved.mean_angles)
-        band = damping_band(linear, settings.method, solved.speed, solved.amplitude, jumps)
+        band = damping_band(linear, settings.method, solved.speed, solved.amplitude, solved.jumps)
     growth = solver.growth(float(even.min()), float(even.max()))
     return SteadyResponse(
         assembly=model.waves.assembly,
@@ -481,17 +485,14 @@ def _with_tops(
     def curves() -> ResponseCurves:
         """Return the response over the speeds that are solved."""
         is_solved = np.flatnonzero(np.isfinite(points.drive_torque))
-        order = is_solved[np.argsort(points.speed[is_solved], kind="stable")]
+        own = points.part(is_solved[np.argsort(points.speed[is_solved], kind="stable")])
         # Loads that do not settle may have several states.
-        kinks = points.apart.any(axis=1) | points.free.any(axis=1) | (points.mean_angles & model.is_nonlinear)
-        smooth = np.asarray(~kinks)[order]
-        speed = points.speed[order]
+        kinks = own.apart.any(axis=1) | own.free.any(axis=1) | (own.mean_angles & model.is_nonlinear)
         audible = None
         if model.radiated is not None:
-            audible = line_frequencies(speed, model.lines.orders) <= model.radiated.limit
-        jumps = beside_jumps(points.mean_angles[order])
+            audible = line_frequencies(own.speed, model.lines.orders) <= model.radiated.limit
         return ResponseCurves(
-            speed, points.amplitude[order], smooth, jumps, model.quantities, operation, damping, audible
+            own.speed, own.amplitude, ~kinks, own.jumps, model.quantities, operation, damping, audible
         )
 
     for missed in (partial(missed_tops, known=tops, count=loudest), missed_flanks):

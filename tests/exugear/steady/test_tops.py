@@ -9,6 +9,7 @@ import pytest
 import scipy.optimize
 
 from exugear.steady.crossings import Crossing, with_crossings
+from exugear.steady.harmonics.branches import beside_jumps
 from exugear.steady.mean_system.signals import quantities_of
 from exugear.steady.tops import ResponseCurves, higher_between, missed_tops
 
@@ -27,7 +28,9 @@ def curves_of(values, **changes):
     amplitude = np.stack([np.zeros_like(values), values], axis=1)[..., None].astype(np.complex64)
     quantities = quantities_of(["surface_velocity"], ())
     smooth = np.ones(len(SPEED), dtype=bool)
-    return replace(ResponseCurves(SPEED, amplitude, smooth, quantities, None, DAMPING), **changes)
+    return replace(
+        ResponseCurves(SPEED, amplitude, smooth, np.zeros(len(SPEED), dtype=bool), quantities, None, DAMPING), **changes
+    )
 
 
 def test_the_top_of_the_surface_velocity_is_that_of_its_square():
@@ -51,6 +54,29 @@ def test_lines_above_the_band_of_the_housing_ask_for_no_speeds():
 def test_neighbours_with_contact_loss_predict_no_top():
     smooth = np.abs(SPEED - 1.0) > 0.1
     assert not missed_tops(curves_of(surface(SPEED), smooth=smooth), {}).size
+
+
+def test_a_jump_among_neighbours_predicts_no_top_and_is_no_peak():
+    """As where sidebands are left out below a speed: the curves on either side have nothing in common."""
+    kinds = SPEED < 1.0
+    jumps = beside_jumps(kinds)
+    assert not missed_tops(curves_of(surface(SPEED), jumps=jumps), {}).size
+    falling = np.where(kinds, 1e-6, 1.0 / SPEED**2)
+    quantity = curves_of(falling).quantities[0]
+    beside = int(np.flatnonzero(~kinds)[0])
+    assert quantity.peaks(falling[:, None]) == [(beside, 0)]
+    assert quantity.peaks(falling[:, None], curves_of(falling, jumps=jumps).ranked) == []
+
+
+@pytest.mark.parametrize(("share", "count"), [(1e-5, 2), (1e-7, 1)])
+def test_peaks_of_round_off_are_left_out(share, count):
+    """So are those below what counts as vibration, 1e-12 m/s, however low the others are."""
+    peak = surface(SPEED)
+    sizes = np.stack([peak, share * peak[::-1]], axis=1)
+    (quantity,) = quantities_of(["surface_velocity"], ())
+    lines = [line for _, line in quantity.peaks(sizes)]
+    assert set(lines) == set(range(count)) and lines == sorted(lines)
+    assert quantity.peaks(1e-15 * sizes) == []
 
 
 @pytest.mark.parametrize(("damping", "is_added"), [(0.01, True), (0.03, False)])
