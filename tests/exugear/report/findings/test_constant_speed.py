@@ -33,6 +33,7 @@ def response(level: str = "parametric", branches: bool = False, sign: float = -1
     return xr.Dataset(
         {
             "speed": ("point", speed),
+            "loads_at_mean_angles": ("point", np.zeros(len(speed), dtype=np.int8)),
             "order": ("line", np.array([0.0, STORED_LINE.order, 7.5 * STORED_LINE.order])),
             "index": (("line", "base"), np.array([[0], [1], [2]])),
             "amplitude": (("point", "line", "signal"), amplitude),

@@ -39,6 +39,7 @@ def response(operation, carried=False):
     return xr.Dataset(
         {
             "speed": ("point", -SPEED),
+            "loads_at_mean_angles": ("point", np.zeros(len(SPEED), dtype=np.int8)),
             "amplitude": (("point", "line", "signal"), amplitude),
             "phase": (("point", "line", "signal"), np.zeros_like(amplitude)),
             "index": (("line", "base"), np.array([[0], [1], [2]])),
