@@ -17,7 +17,6 @@ from exugear.gearbox.load_cases import operating_range
 from exugear.steady.balance.model import HarmonicBalanceModel
 from exugear.steady.balance.response import linear_response, parametric_response, signals
 from exugear.steady.crossings import in_operation
-from exugear.steady.harmonics.branches import peaks_of_lines
 from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.steady.mean_system.signals import Quantity
 from exugear.steady.settings import Method
@@ -201,8 +200,9 @@ def _highest_peaks(
     of_quantity: list[set[tuple[int, int]]] = []
     for quantity in quantities:
         size = quantity.sizes(amplitude[:, 1:]).max(axis=2)
-        of_quantity.append(set(peaks_of_lines(size)))
-        chosen |= set(quantity.peaks(size, counted[:, None])[:MOST_PEAKS])
+        peaks = quantity.peaks(size, counted[:, None])
+        of_quantity.append(set(peaks))
+        chosen |= set(peaks[:MOST_PEAKS])
     ordered = sorted(chosen)
     rises = np.array([[peak in peaks for peaks in of_quantity] for peak in ordered], dtype=bool)
     point, line = np.array(ordered, dtype=np.int64).reshape(-1, 2).T

@@ -176,9 +176,11 @@ def _speeds(data: xr.Dataset) -> Iterator[Finding]:
             text += "their bodies too far to settle, so sums and differences of their orders are missing there"
             remedy = "use exugear run"
         else:
-            text = f"positions in the mesh cycle of the mean speed, without the vibration, up to {_rpm(at.max())}: it "
-            text += "moves them by over a tenth of a cycle, so sidebands of mesh orders are missing there"
-            remedy = "use --method nonlinear"
+            text = (
+                f"positions in the mesh cycle follow the mean speed alone up to {_rpm(at.max())}: the vibration would "
+            )
+            text += "move them by over a tenth of a cycle, so sidebands of mesh orders are missing there"
+            remedy = "use --method nonlinear, with excitations exugear run"
         text += f"; add the inertia of the connected machines, raise the lowest speed, or {remedy}"
         operation = json.loads(str(data.attrs["operating_range"]))
         inside = operation is None or bool(((at >= operation[0]) & (at <= operation[1])).any())

@@ -70,10 +70,8 @@ def validity_checks(context: Context, group: RunGroup) -> tuple[Finding, ...]:
     operation = operating_range(context.gearbox)
     fastest = float(run.spectra.speed.max())
     if operation is not None and fastest > BEYOND_OPERATION * operation[1]:
-        text = (
-            f"the highest computed speed is {figure_text(fastest / operation[1], 2)} times the highest operating speed"
-        )
-        findings.append(Finding("warning", f"{text}; speeds outside the operating range are not ranked"))
+        text = f"the highest computed speed is {figure_text(fastest / operation[1], 2)} times the highest operating "
+        findings.append(Finding("warning", f"{text}speed; speeds outside the operating range are not ranked"))
     return tuple(sorted(findings, key=lambda own: not own.passed))
 
 
