@@ -176,9 +176,7 @@ def _speeds(data: xr.Dataset) -> Iterator[Finding]:
             text += "their bodies too far to settle, so sums and differences of their orders are missing there"
             remedy = "use exugear run"
         else:
-            text = (
-                f"positions in the mesh cycle follow the mean speed alone up to {_rpm(at.max())}: the vibration would "
-            )
+            text = f"positions in the mesh cycle follow the mean speed alone up to {_rpm(at.max())}: vibration would "
             text += "move them by over a tenth of a cycle, so sidebands of mesh orders are missing there"
             remedy = "use --method nonlinear, with excitations exugear run"
         text += f"; add the inertia of the connected machines, raise the lowest speed, or {remedy}"
