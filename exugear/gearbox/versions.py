@@ -16,7 +16,7 @@ RUN = 12
 #: Life of gears and bearings (`exugear.life`, and the root stress of `fe_ste.root_stress`).
 LIFE = 10
 #: Steady-state responses (`exugear.steady`, and all methods that modes use).
-STEADY = 32
+STEADY = 33
 #: Comparisons with measured run-ups (`exugear.steady.evaluation`, `exugear.results.order_tracking`).
 MEASURED = 4
 #: Points of studies (`exugear.studies`: their outputs; the methods that these use have their own versions).

@@ -94,7 +94,7 @@ class SpeedCaveats:
             found.append(f"{text}too high")
         for mesh, fraction in self.tensile.items():
             if fraction[point] > 0.0:
-                text = f"tensile force of {mesh} for {100.0 * float(fraction[point]):.2g} % of the time: invalid, "
+                text = f"tensile force of {mesh} for {_percent(float(fraction[point]))} of the time: invalid, "
                 found.append(f"{text}because contact loss is neglected")
         return tuple(found)
 
@@ -168,18 +168,17 @@ def _speeds(data: xr.Dataset) -> Iterator[Finding]:
         first = f"{_rpm(missing[0]['speed'])}: {missing[0]['reason']}"
         text = f"no steady state found at {len(missing)} speeds (blank in the diagrams), first {first}"
         yield Finding("warning", text, len(missing))
-    if (at := np.abs(data["speed"].to_numpy()[data["loads_at_mean_angles"].to_numpy() == 1])).size:
-        if data.attrs["method"] == "nonlinear":
-            shown = ", ".join(_rpm(speed) for speed in at[:SHOWN_SPEEDS])
+    speed = np.abs(data["speed"].to_numpy())
+    if (at := speed[data["loads_at_mean_angles"].to_numpy() == 1]).size:
+        where = f"up to {_rpm(at.max())}"
+        if at.size < np.count_nonzero(speed <= at.max()):
             more = f" and {at.size - SHOWN_SPEEDS} more" if at.size > SHOWN_SPEEDS else ""
-            text = f"excitations at the angles of the mean speed, without the vibration, at {shown}{more}: they turn "
-            text += "their bodies too far to settle, so sums and differences of their orders are missing there"
-            remedy = "use exugear run"
-        else:
-            text = f"positions in the mesh cycle follow the mean speed alone up to {_rpm(at.max())}: vibration would "
-            text += "move them by over a tenth of a cycle, so sidebands of mesh orders are missing there"
-            remedy = "use --method nonlinear, with excitations exugear run"
-        text += f"; add the inertia of the connected machines, raise the lowest speed, or {remedy}"
+            where = f"at {', '.join(_rpm(one) for one in at[:SHOWN_SPEEDS])}{more}"
+        text = f"meshes and excitations follow the mean speed alone {where}: vibration would turn gears by over a "
+        text += (
+            "tenth of a mesh cycle, so sidebands are missing there; add the inertia of the connected machines, raise "
+        )
+        text += "the lowest speed, or use exugear run"
         operation = json.loads(str(data.attrs["operating_range"]))
         inside = operation is None or bool(((at >= operation[0]) & (at <= operation[1])).any())
         yield Finding("warning" if inside else "note", text, at.size)
@@ -207,7 +206,7 @@ def _models(data: xr.Dataset) -> Iterator[Finding]:
     model = str(data.attrs["mesh_model"])
     for pull in () if LAWS[model].loses_contact else pulls(data):
         text = f"{pull.name}: tensile mesh force at {pull.count} of {data.sizes['point']} speeds, at most "
-        text += f"{100.0 * pull.share:.2g} % of the time at {_rpm(pull.speed)}; amplitudes there are invalid, because "
+        text += f"{_percent(pull.share)} of the time at {_rpm(pull.speed)}; amplitudes there are invalid, because "
         text += f"the model {model} neglects contact loss; use --mesh-model table --method nonlinear"
         yield Finding("warning", text, pull.share)
     turned = any(str(name).startswith("rotation of ") for name in data["base"].values)
@@ -224,7 +223,7 @@ def _models(data: xr.Dataset) -> Iterator[Finding]:
         yield Finding("note", text, max(sharing.values()))
     apart = float(np.max(np.nan_to_num(data["contact_loss_fraction"].to_numpy()), initial=0.0))
     if apart > 0.0:
-        text = f"contact loss for up to {100.0 * apart:.2g} % of the time (included in the mesh model)"
+        text = f"contact loss for up to {_percent(apart)} of the time (included in the mesh model)"
         yield Finding("passed", text, apart)
     if names := str(data.attrs["bearings_in_time"]):
         yield Finding("note", f"nonlinear bearings (rolling elements evaluated in time): {names}")
@@ -298,7 +297,7 @@ def _excitation(data: xr.Dataset) -> Iterator[Finding]:
         combined = bool((np.count_nonzero(data["index"].to_numpy(), axis=1) > 1).any())
         more = ", and 1.5 times as many combinations of meshes," if combined else ""
         text = f"{harmonics} mesh harmonics ({math.ceil(1.5 * harmonics)}{more} would change the ten highest peaks by "
-        text += f"at most {100.0 * change:.1g} %)"
+        text += f"at most {_percent(change)})"
         yield Finding("warning" if change > NOTICED_CHANGE else "note", text, change)
     else:
         yield Finding("note", f"{harmonics} mesh harmonics; harmonics that a solution requires are added")

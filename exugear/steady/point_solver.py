@@ -183,6 +183,7 @@ class PointSolver:
         self.method = method
         self.model = model.with_bearings if method == "nonlinear" else model
         self._last: Complexes | None = None
+        self._at_mean_angles = False
         self.state: ContactLossState | None = None
 
     @property
@@ -256,11 +257,14 @@ class PointSolver:
 
     def _settle_in_time(self, interface: Interface) -> Response:
         try:
-            found, self._last = nonlinear_response(self.model, interface, self.sampling, self._last)
+            found, self._last = nonlinear_response(
+                self.model, interface, self.sampling, self._last, self._at_mean_angles
+            )
         except HarmonicBalanceError:
             if self._last is None:
                 raise
             found, self._last = nonlinear_response(self.model, interface, self.sampling)
+        self._at_mean_angles = found.at_mean_angles
         return found
 
     def _with_contact_loss(self, speed: float) -> ContactLossState:
@@ -270,7 +274,7 @@ class PointSolver:
         reason = ""
         try:
             model, readings = _thinned(last, self.model) if last else (self.model, None)
-            found = _refined(model, speed, readings)
+            found = _refined(model, speed, readings, last is not None and last.response.at_mean_angles)
         except HarmonicBalanceError as error:
             reason = str(error)
             found = self._from_rest(speed)
@@ -337,12 +341,13 @@ def _with_passing(state: ContactLossState) -> ContactLossState:
     """Model planets individually: return a state with the sidebands of their passing, where these are relevant."""
     found = state
     speed = state.response.interface.speed
+    still = state.response.at_mean_angles
     size = float(np.linalg.norm(state.readings[1:, :, DEFLECTION]))
     for _ in range(MOST_SIDEBANDS):
         model = found.model.passing(np.linalg.norm(found.readings[..., DEFLECTION], axis=1) > SIDEBAND_TOL * size)
         if model is None:
             break
-        balance = HarmonicResidual(model, model.at(speed), model.sampling)
+        balance = HarmonicResidual(model, model.at(speed), model.sampling, still)
         start = readings_in(found.model, found.readings, model)
         known = found.model.places_in(model)[0].ravel()
         new = np.linalg.norm(balance.missing(start)[..., DEFLECTION], axis=1)
@@ -352,7 +357,7 @@ def _with_passing(state: ContactLossState) -> ContactLossState:
             break
         wanted[known] = True
         model = model.of(wanted)
-        balance = HarmonicResidual(model, model.at(speed), model.sampling)
+        balance = HarmonicResidual(model, model.at(speed), model.sampling, still)
         start = readings_in(found.model, found.readings, model)
         enough = SIDEBAND_RESIDUAL * size / float(np.linalg.norm(balance.static[..., DEFLECTION]))
         try:
@@ -396,9 +401,14 @@ def _state_near(model: HarmonicBalanceModel, interface: Interface, leg: Settling
     return None
 
 
-def _refined(model: HarmonicBalanceModel, speed: float, start: Complexes | None) -> ContactLossState:
-    """Solve at a speed, from given readings or the static state, with those lines more that it lacks."""
-    balance = HarmonicResidual(model, model.at(speed), model.sampling)
+def _refined(
+    model: HarmonicBalanceModel, speed: float, start: Complexes | None, at_mean_angles: bool = False
+) -> ContactLossState:
+    """Solve at a speed, from given readings or the static state, with those lines more that it lacks.
+
+    `at_mean_angles` is whether that is tried first, as `solve_turning` has it.
+    """
+    balance = HarmonicResidual(model, model.at(speed), model.sampling, at_mean_angles)
     readings = balance.static if start is None else start
     products = 0
     for _ in range(MOST_REFINED):
@@ -410,8 +420,8 @@ def _refined(model: HarmonicBalanceModel, speed: float, start: Complexes | None)
         # Kinks where something parts reach farther than any smooth law does.
         kinks = _parted(response_of_readings(balance, readings))
         before = balance.model
-        lines = balance.model.with_lines(joined(balance.model.lines, lacking), kinks)
-        balance = HarmonicResidual(lines, lines.at(speed), lines.sampling)
+        lines = before.with_lines(joined(before.lines, lacking), kinks)
+        balance = replace(balance, model=lines, interface=lines.at(speed), sampling=lines.sampling)
         readings = readings_in(before, readings, lines)
     balance, readings, took = solve_turning(balance, readings)
     products += took
@@ -434,7 +444,7 @@ def _without_aliases(balance: HarmonicResidual, readings: Complexes) -> tuple[Ha
     products = 0
     for _ in range(MOST_DENSER):
         denser = balance.model.denser
-        ahead = HarmonicResidual(denser, balance.interface, denser.sampling)
+        ahead = replace(balance, model=denser, sampling=denser.sampling)
         if float(np.linalg.norm(ahead.missing(readings)[..., DEFLECTION])) < ALIASED * size:
             break
         balance, readings, took = solve_turning(ahead, readings)
@@ -449,13 +459,13 @@ def _lacking(balance: HarmonicResidual, readings: Complexes) -> LineSet | None:
     """
     whole = _acted_on(balance, readings)
     size = float(np.linalg.norm(readings[1:, :, DEFLECTION]))
-    ahead = HarmonicResidual(whole, whole.at(balance.interface.speed), whole.sampling)
+    ahead = replace(balance, model=whole, interface=whole.at(balance.interface.speed), sampling=whole.sampling)
     start = readings_in(balance.model, readings, whole)
-    if whole.shaft_orders.has_loads:
+    if whole.shaft_orders.has_loads and not balance.at_mean_angles:
         ahead = ahead.with_turned_loads(start)
     excess, tangent, _ = ahead.forces(start)
     missing = tangent.alone(ahead.answer(excess) + ahead.static - start)
-    new = _sizes(whole, missing)
+    new = _sizes(whole, missing, balance.at_mean_angles)
     new[balance.model.places_in(whole)[0]] = 0.0
     wanted = largest(new, MAX_NEGLECTED_NORM * size)
     if wanted.any():
@@ -479,15 +489,15 @@ def _acted_on(balance: HarmonicResidual, readings: Complexes) -> HarmonicBalance
     return whole.of(own | largest(np.where(own, 0.0, sizes), FORCELESS * vibration))
 
 
-def _sizes(model: HarmonicBalanceModel, readings: Complexes) -> Floats:
+def _sizes(model: HarmonicBalanceModel, readings: Complexes, at_mean_angles: bool) -> Floats:
     """Sizes (n,) of lines in readings (n, m, r), m: deflections, with stated loads also rotations along the pitch."""
-    read = [DEFLECTION, POSITION] if model.shaft_orders.sidebands else [DEFLECTION]
+    read = [DEFLECTION, POSITION] if model.shaft_orders.sidebands and not at_mean_angles else [DEFLECTION]
     return np.asarray(np.linalg.norm((model.lengths * readings)[..., read], axis=(1, 2)))
 
 
 def _thinned(state: ContactLossState, usual: HarmonicBalanceModel) -> tuple[HarmonicBalanceModel, Complexes]:
     """Orders of a state, without negligible ones beyond the usual orders, and its readings in them."""
-    sizes = _sizes(state.model, state.readings)
+    sizes = _sizes(state.model, state.readings, state.response.at_mean_angles)
     needed = np.isin(np.arange(len(sizes)), usual.places_in(state.model)[0])
     sizes[needed] = 0.0
     kept = needed | largest(sizes, DROP_LINE_TOL * float(np.linalg.norm(state.readings[1:, :, DEFLECTION])))

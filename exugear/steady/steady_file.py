@@ -110,7 +110,7 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
         "growth": (solved.growth, {"units": "1/s", "long_name": "largest growth rate of a disturbance"}),
         "loads_at_mean_angles": (
             solved.mean_angles.astype(np.int8),
-            {"units": "1", "long_name": "1 where stated loads do not settle at the angles that include the vibration"},
+            {"units": "1", "long_name": "1 where meshes and stated loads are at the angles of the mean speed"},
         ),
         "remark": (solved.remark.astype(object), {}),
         "left_out": (

@@ -193,8 +193,8 @@ class SolvedPoints:
     growth: Floats
     """(points,) largest growth rate of a disturbance, 1/s, on a continuation and with contact loss; NaN elsewhere."""
     mean_angles: Booleans
-    """(points,) whether positions in the mesh cycles or, with the method `nonlinear`, stated loads are at the angles of
-    the mean speed, because the vibration turns their bodies too far."""
+    """(points,) whether meshes and stated loads are at the angles of the mean speed, because the vibration turns their
+    bodies too far."""
     remark: Texts
     """(points,) what is to be said of a point, or why there is none: its numbers are NaN then."""
 
@@ -486,8 +486,7 @@ def _with_tops(
         """Return the response over the speeds that are solved."""
         is_solved = np.flatnonzero(np.isfinite(points.drive_torque))
         own = points.part(is_solved[np.argsort(points.speed[is_solved], kind="stable")])
-        # Loads that do not settle may have several states.
-        kinks = own.apart.any(axis=1) | own.free.any(axis=1) | (own.mean_angles & model.is_nonlinear)
+        kinks = np.asarray(own.apart.any(axis=1) | own.free.any(axis=1))
         audible = None
         if model.radiated is not None:
             audible = line_frequencies(own.speed, model.lines.orders) <= model.radiated.limit
@@ -653,8 +652,8 @@ def _fill(out: SolvedPoints, n: int, model: HarmonicBalanceModel, response: Resp
     out.products[n] = response.products
     out.apart[n] = response.apart
     out.free[n] = response.free
+    out.mean_angles[n] = response.at_mean_angles
     loads = response.interface.loads
-    out.mean_angles[n] = response.at_mean_angles or (loads is not None and loads.at_mean_angles)
     least = max(RESOLVED * exchanged_power(response), 1e-300)
     deflections = np.abs(response.deflection)
     nothing_loads = loads is None or not loads.motion[1:].any()

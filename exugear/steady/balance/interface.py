@@ -28,9 +28,6 @@ class LoadResponse:
     """Mean torque of the drive that overcomes them, N m."""
     reactions: Complexes
     """(n, 6 r) reactions of stated loads on fixed bodies, N and N m."""
-    at_mean_angles: bool = False
-    """Whether stated loads are at the angles of the mean speed because they did not settle at those that the vibration
-    gives their bodies."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,7 +22,7 @@ from exugear.steady.balance.passing_planets import (
     carried_readings,
     solve_one_by_one,
 )
-from exugear.steady.balance.response import Response, rates_of
+from exugear.steady.balance.response import LARGEST_SHIFT, Response, rates_of
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError, solve_lines
 from exugear.steady.harmonics.lines import TorusSampling
 from exugear.steady.mean_system.bearing_waves import COMPONENTS
@@ -68,6 +68,8 @@ class HarmonicResidual:
     model: HarmonicBalanceModel
     interface: Interface
     sampling: TorusSampling
+    at_mean_angles: bool = False
+    """Whether meshes and stated loads are at the angles of the mean speed, without what the vibration adds."""
 
     @cached_property
     def static(self) -> Complexes:
@@ -213,6 +215,11 @@ class HarmonicResidual:
         """Sample the laws in all places: readings and rates (s, u, r), stiffness (6, s, u); results (s, u, ...)."""
         waves = self.model.waves
         meshes = self.model.waves.assembly.meshes
+        of_meshes = np.array(places.means) < self.meshes
+        if self.at_mean_angles:
+            readings, rates = readings.copy(), rates.copy()
+            readings[:, of_meshes, POSITION] = (places.there @ self.static[0].real)[..., of_meshes, POSITION]
+            rates[:, of_meshes, POSITION] = 0.0
         found = []
         for u, n in enumerate(places.means):
             if n >= self.meshes:
@@ -228,7 +235,11 @@ class HarmonicResidual:
                 found.append(samples)
         shape = self.interface.ports.forces.shape[1], readings.shape[2]
         found = [widened(samples, *shape) for samples in found]
-        return LawSamples(*(np.stack(samples, axis=1) for samples in zip(*found, strict=True)))
+        sampled = LawSamples(*(np.stack(samples, axis=1) for samples in zip(*found, strict=True)))
+        if self.at_mean_angles:
+            sampled.slope[:, of_meshes, :, POSITION] = 0.0
+            sampled.damping[:, of_meshes, :, POSITION] = 0.0
+        return sampled
 
     def _sample_row(self, wave: int, readings: Floats, stiffness: Floats) -> LawSamples:
         """Sample the law of a mesh along a row with readings (s, r), stiffness (3 q, s)."""
@@ -415,6 +426,11 @@ class HarmonicResidual:
         """Find what is missing to the balance (n, m, r)."""
         return readings - self.static - self.answer(self.forces(readings)[0])
 
+    def turns_far(self, readings: Complexes) -> bool:
+        """Return whether the vibration in readings (n, m, r) moves a mesh by more than `LARGEST_SHIFT`."""
+        moved = 2.0 * np.abs(readings[1:, : self.meshes, POSITION])
+        return bool(moved.sum(axis=0).max(initial=0.0) > LARGEST_SHIFT)
+
     def with_turned_loads(self, readings: Complexes) -> HarmonicResidual:
         """Return the balance with stated loads turned by the motion that readings (n, m, r) belong to."""
         motion = response_of_readings(self, readings).motion
@@ -520,7 +536,11 @@ class Tangent:
 
 
 def nonlinear_response(
-    model: HarmonicBalanceModel, interface: Interface, sampling: TorusSampling, start: Complexes | None = None
+    model: HarmonicBalanceModel,
+    interface: Interface,
+    sampling: TorusSampling,
+    start: Complexes | None = None,
+    at_mean_angles: bool = False,
 ) -> tuple[Response, Complexes]:
     """Response by the laws in time, and the readings (n, m, r), from which a neighbouring speed may start.
 
@@ -529,7 +549,7 @@ def nonlinear_response(
     HarmonicBalanceError
         Newton's method found no balance from this start.
     """
-    balance = HarmonicResidual(model, interface, sampling)
+    balance = HarmonicResidual(model, interface, sampling, at_mean_angles)
     balance, readings, products = solve_turning(balance, balance.static if start is None else start)
     return response_of_readings(balance, readings, products), readings
 
@@ -543,12 +563,53 @@ def turned_balance(model: HarmonicBalanceModel, interface: Interface, readings: 
 def solve_turning(
     balance: HarmonicResidual, readings: Complexes, enough: float = BALANCED
 ) -> tuple[HarmonicResidual, Complexes, int]:
-    """Solve the balance with stated loads that turn with the vibration of their bodies; parameters of `solve_balance`.
+    """Solve the balance with meshes and stated loads at the angles that the vibration gives their bodies.
 
-    Where the loads do not settle, as near standstill where they turn the free gear train by more than a period, they
-    are at the angles of the mean speed, and `LoadResponse.at_mean_angles` says so.
+    Where it turns the free gear train by more than `LARGEST_SHIFT`, as near standstill, their forces change by far more
+    orders than the balance has: they are at the angles of the mean speed then, as with the method `parametric`.
+
+    Parameters
+    ----------
+    balance : tried first with its angles; another speed nearby shows which
+    readings, enough : as of `solve_balance`
+
+    Returns
+    -------
+    The balance with its loads and angles, the readings, and the number of products that they took.
+
+    Raises
+    ------
+    HarmonicBalanceError
+        Newton's method found no balance, although the vibration does not turn the gear train that far.
     """
-    still = balance
+    orders = balance.model.shaft_orders
+    if not (orders.sidebands or orders.has_loads):
+        return balance, *solve_balance(balance, readings, enough)
+    products = 0
+    if balance.at_mean_angles:
+        readings, products = solve_balance(balance, readings, enough)
+        if balance.turns_far(readings):
+            return balance, readings, products
+        balance = replace(balance, at_mean_angles=False)
+    failed = None
+    try:
+        settled, found, took = _settled_loads(balance, readings, enough)
+        products += took
+        if settled is not None and not settled.turns_far(found):
+            return settled, found, products
+    except HarmonicBalanceError as error:
+        failed, found = error, readings
+    still = replace(balance, at_mean_angles=True)
+    found, took = solve_balance(still, found, enough)
+    if failed is not None and not still.turns_far(found):
+        raise failed
+    return still, found, products + took
+
+
+def _settled_loads(
+    balance: HarmonicResidual, readings: Complexes, enough: float
+) -> tuple[HarmonicResidual | None, Complexes, int]:
+    """Solve the balance, its stated loads at the angles of their bodies; None in its place if these do not settle."""
     readings, products = solve_balance(balance, readings, enough)
     if not balance.model.shaft_orders.has_loads:
         return balance, readings, products
@@ -560,16 +621,12 @@ def solve_turning(
         change = float(np.linalg.norm((turned.static - balance.static)[..., DEFLECTION])) / size
         if change <= enough:
             return balance, readings, products
-        if change > before:
+        if change > before or balance.turns_far(readings):
             break
         balance = turned
         readings, took = solve_balance(balance, readings, enough)
         products += took
-    readings, took = solve_balance(still, readings, enough)
-    loads = still.interface.loads
-    assert loads is not None
-    interface = replace(still.interface, loads=replace(loads, at_mean_angles=True))
-    return replace(still, interface=interface), readings, products + took
+    return None, readings, products
 
 
 def solve_balance(balance: HarmonicResidual, readings: Complexes, enough: float = BALANCED) -> tuple[Complexes, int]:
@@ -579,6 +636,10 @@ def solve_balance(balance: HarmonicResidual, readings: Complexes, enough: float 
     """
     size = float(np.linalg.norm(balance.static[..., DEFLECTION]))
     lengths = balance.model.lengths
+    if balance.at_mean_angles:
+        # No force follows the positions, whose round-off near standstill is that of large rotations.
+        lengths = lengths.copy()
+        lengths[: balance.meshes, POSITION] = 0.0
     products = 0
     excess, tangent, _ = balance.forces(readings)
     missing = readings - balance.static - balance.answer(excess)
@@ -635,7 +696,9 @@ def response_of_readings(balance: HarmonicResidual, readings: Complexes, product
         free = np.mean(~whole.any(axis=2), axis=0)
         unloaded = np.array([free[laws == law].mean() for law in range(len(model.bearings.firsts))])
     of_bearings = balance.bearing_forces(excess)
-    return Response(interface, deflection, excess, force * waves.line_of_action, products, apart, unloaded, of_bearings)
+    line = force * waves.line_of_action
+    still = balance.at_mean_angles
+    return Response(interface, deflection, excess, line, products, apart, unloaded, of_bearings, still)
 
 
 def _mean_of_waves(there: Floats, back: Floats, slopes: Floats) -> Floats:

@@ -132,11 +132,22 @@ class ShaftOrders:
 
     @property
     def products(self) -> tuple[Sidebands, ...]:
-        """Sums and differences of two orders, which nonlinear forces add to these."""
-        orders = {own.multiples for own in self.sidebands if own.base is None}
-        both = itertools.product(orders, orders, (1, -1))
-        sums = {tuple(a + sign * b for a, b in zip(one, other, strict=True)) for one, other, sign in both}
-        return tuple(Sidebands(multiples) for multiples in sorted(sums) if any(multiples))
+        """Sums and differences of two orders, which nonlinear forces add to these.
+
+        Beside mesh orders those of one rotation: samples that keep all of several rotations apart are seven times as
+        many with three eccentric gears in the GRC.
+        """
+        rotations = len(self.rotations)
+        found = []
+        for own, other in itertools.product(self.sidebands, repeat=2):
+            alone = own.base is None and other.base is None
+            turning, also = (np.array(one.multiples[-rotations:]) != 0 for one in (own, other))
+            if alone or (own.base is not None and np.array_equal(turning, also)):
+                for sign in (1, -1):
+                    both = tuple(a + sign * b for a, b in zip(own.multiples, other.multiples, strict=True))
+                    if any(both):
+                        found.append(replace(own, multiples=both))
+        return tuple(dict.fromkeys(found))
 
     @property
     def without_load_sidebands(self) -> ShaftOrders:
