@@ -240,9 +240,11 @@ def _models(data: xr.Dataset) -> Iterator[Finding]:
         more = f"; and {len(swings) - SHOWN_BEARINGS} more" if len(swings) > SHOWN_BEARINGS else ""
         text = f"dynamic load of bearings over {100.0 * STRAINED:.0f} % of their static load or preload "
         text += f"({'; '.join(loads)}{more}): "
-        # Rolling elements of planets that are not alike are evaluated by runs alone.
-        way = "exugear run" if varying_carriers(data) else "--method nonlinear"
-        text += f'outside the linear range, peaks there are too high; set model = "iso16281" and use {way}'
+        text += 'outside the linear range, peaks there are too high; set model = "iso16281"'
+        if varying_carriers(data):  # runs alone evaluate rolling elements of planets that are not alike
+            text += " and use exugear run"
+        elif data.attrs["method"] != "nonlinear":
+            text += " and use --method nonlinear"
         yield Finding("warning", text, swings[0].share)
     variation = float(data.attrs["stiffness_variation"])
     if variation > NOTICED_VARIATION:

@@ -412,11 +412,9 @@ def _doubts(material: ReportData, headline: Headline, top: Resonance) -> Iterato
         seen = track_mode(variation, mode.frequency).frequency
         values = variation.parameter.values
         place = default_place(variation)
-        ends = [rounded_text(float(seen[n])) for n in (0, -1)]
-        yield (
-            f"{capitalised(label)} {values[0]:g} to {values[-1]:g} instead of {values[place]:g}: "
-            f"{ends[0]} to {ends[1]} Hz."
-        )
+        low, high = (rounded_text(float(seen[n])) for n in (0, -1))
+        moves = f"{low} to {high} Hz" if low != high else "the same frequency"
+        yield f"{capitalised(label)} {values[0]:g} to {values[-1]:g} instead of {values[place]:g}: {moves}."
     places = top.amplitudes[headline.ranking.quantity].places
     if places is not None:
         yield "Damping does not change the first rank." if places[1] == 1 else f"Damping: rank 1 to {places[1]}."
