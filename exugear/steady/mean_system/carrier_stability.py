@@ -17,7 +17,7 @@ import math
 import numpy as np
 import scipy.linalg
 
-from exugear.steady.mean_system.mean_system import MeanSystem, most_rolling
+from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.system.modes import state_matrix
 from fe_ste.tools.arrays import Complexes, Floats
 
@@ -32,7 +32,8 @@ MODES = 40
 def growth_over_carrier(system: MeanSystem, speed: float) -> float:
     """Return the fastest growth of a disturbance at a speed of the input (rad/s) other than zero, 1/s.
 
-    Free rolling is left out. Stiffness has to vary with the angle of a carrier: `MeanSystem.over_angles`. Where it
+    Free rolling is held by a spring and a damper along it, beside which it has no inertia in common with vibrations: in
+    a system that varies with the angle it has two exponents of opposite sign, not zero ones. Stiffness has to vary with the angle of a carrier: `MeanSystem.over_angles`. Where it
     varies with those of several, it is the fastest growth with one of them, the others at their mean.
     """
     basis = np.eye(system.size)
@@ -40,6 +41,9 @@ def growth_over_carrier(system: MeanSystem, speed: float) -> float:
         stiffness = system.stiffness_at(speed)
         basis = scipy.linalg.eigh(0.5 * (stiffness + stiffness.T), system.mass, subset_by_index=(0, MODES - 1))[1]
     mass = basis.T @ system.mass @ basis
+    along = basis.T @ system.mass @ system.rolling
+    held = np.outer(along, along) / (system.rolling @ system.mass @ system.rolling)
+    rate = math.sqrt(np.trace(np.linalg.solve(system.mass, system.stiffness_at(speed))) / system.size)
     growths = []
     for carrier, (dampings, at_speeds) in zip(system.frame.varying_carriers, system.over_angles, strict=True):
         places = system.frame.places_of(carrier)
@@ -47,15 +51,13 @@ def growth_over_carrier(system: MeanSystem, speed: float) -> float:
         stiffnesses = system.at(at_speeds, speed)
         dampings = basis.T @ (system.damping_at(speed) + dampings - dampings.mean(axis=0)) @ basis
         stiffnesses = basis.T @ (system.stiffness_at(speed) + stiffnesses - stiffnesses.mean(axis=0)) @ basis
-        found, shapes = exponents_of_turning(mass, dampings, stiffnesses, period)
-        growths.append(float(np.delete(found, most_rolling(system, basis @ shapes)).real.max()))
+        found = exponents_of_turning(mass, dampings + 2.0 * rate * held, stiffnesses + rate**2 * held, period)
+        growths.append(float(found.real.max()))
     return max(growths)
 
 
-def exponents_of_turning(
-    mass: Floats, dampings: Floats, stiffnesses: Floats, period: float
-) -> tuple[Complexes, Complexes]:
-    """Return Floquet exponents (2 n,), 1/s, and shapes (n, 2 n), by columns, of C and K that vary over a turn.
+def exponents_of_turning(mass: Floats, dampings: Floats, stiffnesses: Floats, period: float) -> Complexes:
+    """Return Floquet exponents (2 n,), 1/s, of C and K that vary over a turn.
 
     Parameters
     ----------
@@ -66,7 +68,7 @@ def exponents_of_turning(
     Examples
     --------
     >>> stiffnesses = np.full((3, 1, 1), 100.0)
-    >>> exponents_of_turning(np.eye(1), np.full((3, 1, 1), 2.0), stiffnesses, 0.1)[0].real.round(6)
+    >>> exponents_of_turning(np.eye(1), np.full((3, 1, 1), 2.0), stiffnesses, 0.1).real.round(6)
     array([-1., -1.])
     """
     step = abs(period) / STEPS
@@ -77,9 +79,17 @@ def exponents_of_turning(
     phases = np.where(2 * turns == -count, np.cos(angles), np.exp(1j * angles))
     # Values at the middle of each step are those at even angles with weights (steps, count), by Fourier series.
     weights = (phases @ np.fft.fft(np.eye(count), axis=0)).real / count
+    # At low speeds a turn takes so long that all motion decays to less than the smallest number: its decay on average,
+    # and the size after each step, are factors by themselves.
+    mean = state_matrix(mass, dampings.mean(axis=0), stiffnesses.mean(axis=0))
+    decay = float(np.linalg.eigvals(mean).real.max())
+    growth = decay * abs(period)
     passage = np.eye(2 * len(mass))
     for own in weights:
         constant = state_matrix(mass, np.tensordot(own, dampings, axes=1), np.tensordot(own, stiffnesses, axes=1))
-        passage = scipy.linalg.expm(step * constant) @ passage
-    multipliers, shapes = scipy.linalg.eig(passage)
-    return np.log(multipliers.astype(np.complex128)) / abs(period), shapes[: len(mass)]
+        passage = scipy.linalg.expm(step * (constant - decay * np.eye(len(passage)))) @ passage
+        size = float(np.linalg.norm(passage))
+        passage /= size
+        growth += math.log(size)
+    multipliers = np.asarray(np.linalg.eigvals(passage), dtype=complex)
+    return (np.log(np.where(multipliers == 0.0, 1e-300, multipliers)) + growth) / abs(period)

@@ -109,6 +109,12 @@ class MeanSystem(ReprMixin):
         """Number of coordinates."""
         return len(self.mass)
 
+    @cached_property
+    def rolling(self) -> Floats:
+        """Velocity (size,) of free rolling in the rotating frame, at unit speed of the input."""
+        turning = self.frame.assembly.rolling_velocity(np.zeros(self.size), self.frame.speeds)
+        return np.asarray(np.linalg.solve(self.frame.matrices(0.0)[0], turning))
+
     @property
     def frozen(self) -> MeanSystem:
         """The system with the carriers held at zero angle; itself where stiffness does not vary with their angle.
@@ -599,9 +605,7 @@ def _changes_over_places(
 
 def most_rolling(system: MeanSystem, shapes: Complexes) -> Integers:
     """Return which of some shapes (size, n), by columns, have the largest share of rolling in their energy."""
-    frame = system.frame
-    turning = frame.assembly.rolling_velocity(np.zeros(system.size), frame.speeds)
-    along = system.mass @ np.linalg.solve(frame.matrices(0.0)[0], turning)
+    along = system.mass @ system.rolling
     energy = np.sqrt(np.abs(np.sum(shapes.conj() * (system.mass @ shapes), axis=0)))
     return np.asarray(np.argsort(-np.abs(along @ shapes) / np.maximum(energy, 1e-300))[:ROLLING])
 

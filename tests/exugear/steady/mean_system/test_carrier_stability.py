@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
 from exugear.steady.mean_system.carrier_stability import exponents_of_turning, growth_over_carrier
 from exugear.steady.mean_system.mean_system import mean_system
+from exugear.system.build import assemble
 from exugear.system.modes import fastest_growth, state_matrix
 
 from ...cases import gear_trains
@@ -27,7 +30,7 @@ def test_a_rotor_of_unequal_stiffness_is_unstable_between_its_critical_speeds(sp
     turned = [np.cos(angle) * np.eye(2) + np.sin(angle) * TURN for angle in angles]
     stiffnesses = np.array([r @ stiffness @ r.T for r in turned])
     # Angles of the shaft are counted in its own sense: a shaft that turns backwards passes them in this order, too.
-    found, _ = exponents_of_turning(
+    found = exponents_of_turning(
         mass * np.eye(2), np.tile(damping * np.eye(2), (8, 1, 1)), stiffnesses, 2 * np.pi / speed
     )
     w = sense * speed
@@ -53,3 +56,16 @@ def test_equal_planets_taken_one_by_one_grow_as_their_waves(monkeypatch, speed):
     monkeypatch.setattr("exugear.steady.mean_system.carrier_stability.LARGEST", 10)
     monkeypatch.setattr("exugear.steady.mean_system.carrier_stability.MODES", 20)
     assert growth_over_carrier(system, speed) == pytest.approx(known, rel=1e-3)
+
+
+@pytest.mark.parametrize("train", [gear_trains.planetary("ring", 1), gear_trains.unevenly_spaced()])
+def test_free_rolling_is_no_growth_at_any_speed(train):
+    """One planet has rolling exponents of 1.7 and -1.7 1/s. In a turn at the lowest speed all vibrations die out.
+
+    They had been mistaken for it below 1 rad/s, and a stable gearbox was called unstable.
+    """
+    gearbox = Gearbox.from_dict(train)
+    assembly = assemble(gearbox, Choice("bushing"), dict.fromkeys(gearbox.pairs, np.full(8, 4e8)))
+    system = mean_system(assembly, np.array([0.02, 40.0]))
+    for speed in (0.02, 1.0, 40.0):
+        assert -60.0 < growth_over_carrier(system, speed) < -8.0
