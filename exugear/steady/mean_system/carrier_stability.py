@@ -32,9 +32,10 @@ MODES = 40
 def growth_over_carrier(system: MeanSystem, speed: float) -> float:
     """Return the fastest growth of a disturbance at a speed of the input (rad/s) other than zero, 1/s.
 
-    Free rolling is held by a spring and a damper along it, beside which it has no inertia in common with vibrations: in
-    a system that varies with the angle it has two exponents of opposite sign, not zero ones. Stiffness has to vary with the angle of a carrier: `MeanSystem.over_angles`. Where it
-    varies with those of several, it is the fastest growth with one of them, the others at their mean.
+    Free rolling, which has no inertia in common with vibrations, is held by a spring and a damper along it: in a system
+    that varies with the angle it has two exponents of opposite sign, not zero ones. Stiffness has to vary with the
+    angle of a carrier: `MeanSystem.over_angles`. Where it varies with those of several, it is the fastest growth with
+    one of them, the others at their mean.
     """
     basis = np.eye(system.size)
     if system.size > LARGEST:
@@ -92,4 +93,4 @@ def exponents_of_turning(mass: Floats, dampings: Floats, stiffnesses: Floats, pe
         passage /= size
         growth += math.log(size)
     multipliers = np.asarray(np.linalg.eigvals(passage), dtype=complex)
-    return (np.log(np.where(multipliers == 0.0, 1e-300, multipliers)) + growth) / abs(period)
+    return np.asarray((np.log(np.where(multipliers == 0.0, 1e-300, multipliers)) + growth) / abs(period))
