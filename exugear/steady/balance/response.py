@@ -52,6 +52,8 @@ TOLERANCE = 1e-9
 """Residual of the balance over the static deflections."""
 PASSING_TOLERANCE = 1e-6
 """The same where stiffness varies with the carrier: neighbours that are left out are larger by far."""
+BESIDE_ROTATIONS = 1e-2
+"""Factor on it with the orders of shafts, which turn carrier and planets by a thousand times what meshes deflect."""
 ROUGH_TOLERANCE = 1e-4
 """The same of solutions that only tell how far positions move, which changes forces by a hundredth."""
 POSITIONS_REPEATED = 2
@@ -360,6 +362,7 @@ class LineBalance:
         begin = len(lengths) - len(model.bearing_lengths)
         self._at_loaded = slice(begin, begin + sum(len(own.coordinates) for own in model.loaded_bearings))
         self._lengths = lengths
+        self._turns = bool(self.passing) and bool(model.shaft_orders.sidebands)
 
     def _apply(self, readings: Complexes) -> Complexes:
         out = np.empty_like(readings)
@@ -385,6 +388,8 @@ class LineBalance:
     def solve(self, right: Complexes, start: Complexes | None, rough: bool = False) -> tuple[Complexes, int]:
         """Solve for readings (n, k); the products with K that it took follow."""
         tolerance = PASSING_TOLERANCE if self.passing else TOLERANCE
+        if self._turns:
+            tolerance *= BESIDE_ROTATIONS
         tolerance = ROUGH_TOLERANCE if rough else tolerance
         return solve_lines(self._apply, solve_one_by_one(self.passing, right), tolerance, start)
 

@@ -313,6 +313,9 @@ class Quantity:
     ) -> list[tuple[int, int]]:
         """Return point and line of the peaks over speed of amplitudes, the highest first, without those of round-off.
 
+        The latter are measured by the highest peak and by the highest order at their speed: one that turns the gear
+        train as a whole is no peak, but limits the accuracy of others.
+
         Parameters
         ----------
         sizes : (points, lines) amplitudes
@@ -322,8 +325,8 @@ class Quantity:
         counts = np.broadcast_to(counted, sizes.shape)
         found = [peak for peak in peaks_of_lines(sizes, prominence) if counts[peak]]
         found.sort(key=lambda peak: -sizes[peak])
-        least = round_off(self.name, float(sizes[found[0]])) if found else 0.0
-        return [peak for peak in found if sizes[peak] > least]
+        highest = float(sizes[found[0]]) if found else 0.0
+        return [peak for peak in found if sizes[peak] > round_off(self.name, max(highest, np.nanmax(sizes[peak[0]])))]
 
 
 SIGNALS = {
