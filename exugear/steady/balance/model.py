@@ -23,6 +23,7 @@ from exugear.steady.harmonics.lines import (
     Group,
     HarmonicCoupling,
     LineSet,
+    Sidebands,
     TorusSampling,
     beside,
     joined,
@@ -142,7 +143,8 @@ class HarmonicBalanceModel:
     def larger(self) -> LineSet:
         """Lines that samples keep apart where forces are evaluated in time: products of two lines among them."""
         if self._larger is None:
-            own = self._lines_within(self._reach, products=True, neighbours=min(self.waves.neighbours, KEPT_APART))
+            apart = min(self.waves.neighbours, KEPT_APART)
+            own = self._lines_within(self._reach, self.shaft_orders.products, neighbours=apart)
             # Neighbours farther off are few, and only those that a state has.
             self._larger = joined(own, self.lines) if self.waves.neighbours > KEPT_APART else own
         return self._larger
@@ -256,6 +258,10 @@ class HarmonicBalanceModel:
         known = self._lattices.get(key)
         if self.waves.passing:
             known = rank1_lattice(self.lines, self.larger, least, shared=True)
+        elif known is None and self.shaft_orders.sidebands and not self.loses_contact:
+            reach = HarmonicTruncation(self._reach.harmonics, 1)
+            others = self._lines_within(reach, self.shaft_orders.beside_sidebands, neighbours=0)
+            known = rank1_lattice(self.lines, joined(self.larger, others), least, shared=True)
         elif known is None:
             known = rank1_lattice(self.larger, self.larger, least)
         self._lattices[key] = known
@@ -311,18 +317,18 @@ class HarmonicBalanceModel:
         return other
 
     def _lines_within(
-        self, reach: HarmonicTruncation, products: bool = False, neighbours: int | None = None
+        self, reach: HarmonicTruncation, more: tuple[Sidebands, ...] = (), neighbours: int | None = None
     ) -> LineSet:
         """Orders up to a limit, with the sidebands of planets that mesh out of phase, and the orders of shafts.
 
-        With `products`, sums and differences of the orders of two stated loads are among them. `neighbours` is the
-        number of orders that varying stiffness adds on either side of each; by default that of the waves.
+        `more` are further sums of the latter. `neighbours` is the number of orders that varying stiffness adds on
+        either side of each; by default that of the waves.
         """
         waves = self.waves
         lines = line_set(waves.base_orders.tolist(), reach.harmonics, reach.combinations)
         modulators = [planets for _, planets in waves.carriers]
         slow = self.shaft_orders
-        sidebands = slow.sidebands + (slow.products if products else ())
+        sidebands = slow.sidebands + more
         meshes = len(waves.base_orders)
         if not self.varying:
             lines = beside(lines, modulators, 0) if waves.passing else modulated(lines, modulators)

@@ -132,22 +132,28 @@ class ShaftOrders:
 
     @property
     def products(self) -> tuple[Sidebands, ...]:
-        """Sums and differences of two orders, which nonlinear forces add to these.
+        """Sums and differences of two orders, which nonlinear forces add to these."""
+        orders = {own.multiples for own in self.sidebands if own.base is None}
+        both = itertools.product(orders, orders, (1, -1))
+        sums = {tuple(a + sign * b for a, b in zip(one, other, strict=True)) for one, other, sign in both}
+        return tuple(Sidebands(multiples) for multiples in sorted(sums) if any(multiples))
 
-        Beside mesh orders those of one rotation: samples that keep all of several rotations apart are seven times as
-        many with three eccentric gears in the GRC.
+    @property
+    def beside_sidebands(self) -> tuple[Sidebands, ...]:
+        """Sums of two orders of one rotation beside mesh orders, which meshes have whose positions they move.
+
+        They are small, but so are high mesh orders, to whose frequencies samples in time may map them.
         """
         rotations = len(self.rotations)
-        found = []
-        for own, other in itertools.product(self.sidebands, repeat=2):
-            alone = own.base is None and other.base is None
-            turning, also = (np.array(one.multiples[-rotations:]) != 0 for one in (own, other))
-            if alone or (own.base is not None and np.array_equal(turning, also)):
-                for sign in (1, -1):
-                    both = tuple(a + sign * b for a, b in zip(own.multiples, other.multiples, strict=True))
-                    if any(both):
-                        found.append(replace(own, multiples=both))
-        return tuple(dict.fromkeys(found))
+        of_rotation: dict[tuple[bool, ...], set[tuple[int, ...]]] = {}
+        for own in self.sidebands:
+            turning = tuple(multiple != 0 for multiple in own.multiples[len(own.multiples) - rotations :])
+            opposite = tuple(-multiple for multiple in own.multiples)
+            of_rotation.setdefault(turning, set()).update((own.multiples, opposite))
+        pairs = [pair for own in of_rotation.values() for pair in itertools.product(own, repeat=2)]
+        sums = sorted({tuple(a + b for a, b in zip(*pair, strict=True)) for pair in pairs})
+        bases = sorted({own.base for own in self.sidebands if own.base is not None})
+        return tuple(Sidebands(multiples, base) for multiples in sums if any(multiples) for base in bases)
 
     @property
     def without_load_sidebands(self) -> ShaftOrders:
