@@ -285,13 +285,21 @@ def _excitation(data: xr.Dataset) -> Iterator[Finding]:
     if not _varies(data, "error"):
         # Displaced pins and unbalances still load bearings, at orders of their shafts.
         others = bool(_load_sharing(data)) or is_excited(data)
-        text = f"no excitation{' by the meshes' if others else ''}: the mesh model {data.attrs['mesh_model']} has "
-        text += "constant stiffness over the mesh cycle, and "
+        model = str(data.attrs["mesh_model"])
+        remedy = ""
+        if data.sizes["mesh_wave"]:
+            text = f"no excitation{' by the meshes' if others else ''}: the mesh model {model} has constant stiffness "
+            text += "over the mesh cycle, and "
+            remedy = "; use --mesh-model line_of_action"
+            if LAWS[model].moves_load or LAWS[model].loses_contact:
+                remedy = "; remove the constant stiffness of the pairs, so that their tables are computed"
+        else:
+            text = "the train has no meshes: "
         text += "the overall transmission error does not vary" if others else "all amplitudes are zero"
         turned = any(str(name).startswith("rotation of ") for name in data["base"].values)
         if turned and not Variant.of(str(data.attrs["variant"])).has_bearings:
             text += "; in this variant ideal joints take the forces of excitations and unbalances"
-        yield Finding("warning", f"{text}; use --mesh-model line_of_action")
+        yield Finding("warning" if remedy else "note", f"{text}{remedy}")
         return
     harmonics = int(data.attrs["harmonics"])
     change = float(data.attrs["change_with_more"])

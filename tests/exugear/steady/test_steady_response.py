@@ -146,6 +146,17 @@ def test_an_unbalance_that_loads_bearings_alone_is_an_excitation():
         assert is_excited(data)
         (said,) = [own.text for own in response_findings(data) if own.text.startswith("no excitation")]
         assert "no excitation by the meshes" in said and "the overall transmission error does not vary" in said
+        # The model is the one that is in use: another one is no remedy.
+        assert said.endswith("; remove the constant stiffness of the pairs, so that their tables are computed")
+
+
+def test_a_rotor_without_gears_is_not_advised_to_change_its_mesh_model():
+    content = gear_trains.rotor()
+    content["excitations"] = {"balance": {"body": "motor", "z_mm": 0.0, "unbalance_g_mm": 300.0}}
+    assembly = assemble(Gearbox.from_dict(content), Choice("bushing"), {})
+    data = to_dataset(response_of(assembly, SteadySettings(SpeedRange(20.0, 60.0, 9), at_resonances=False)))
+    (said,) = [own for own in response_findings(data) if "does not vary" in own.text]
+    assert (said.level, said.text) == ("note", "the train has no meshes: the overall transmission error does not vary")
 
 
 def test_an_energy_balance_is_judged_in_both_senses(grc, stiffness):
