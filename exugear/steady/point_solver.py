@@ -183,7 +183,7 @@ class PointSolver:
         self.method = method
         self.model = model.with_bearings if method == "nonlinear" else model
         self._last: Complexes | None = None
-        self._at_mean_angles = False
+        self._at_mean_angles = True
         self.state: ContactLossState | None = None
 
     @property
@@ -263,7 +263,7 @@ class PointSolver:
         except HarmonicBalanceError:
             if self._last is None:
                 raise
-            found, self._last = nonlinear_response(self.model, interface, self.sampling)
+            found, self._last = nonlinear_response(self.model, interface, self.sampling, None, self._at_mean_angles)
         self._at_mean_angles = found.at_mean_angles
         return found
 
@@ -274,7 +274,7 @@ class PointSolver:
         reason = ""
         try:
             model, readings = _thinned(last, self.model) if last else (self.model, None)
-            found = _refined(model, speed, readings, last is not None and last.response.at_mean_angles)
+            found = _refined(model, speed, readings, last is None or last.response.at_mean_angles)
         except HarmonicBalanceError as error:
             reason = str(error)
             found = self._from_rest(speed)

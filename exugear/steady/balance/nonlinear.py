@@ -6,6 +6,7 @@ converted back to orders. Newton's method solves the balance, each step by GMRES
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -584,12 +585,14 @@ def solve_turning(
     """
     orders = balance.model.shaft_orders
     if not (orders.sidebands or orders.has_loads):
+        balance = replace(balance, at_mean_angles=False)
         return balance, *solve_balance(balance, readings, enough)
     products = 0
     if balance.at_mean_angles:
-        readings, products = solve_balance(balance, readings, enough)
-        if balance.turns_far(readings):
-            return balance, readings, products
+        with suppress(HarmonicBalanceError):
+            readings, products = solve_balance(balance, readings, enough)
+            if balance.turns_far(readings):
+                return balance, readings, products
         balance = replace(balance, at_mean_angles=False)
     failed = None
     try:
@@ -641,29 +644,31 @@ def solve_balance(balance: HarmonicResidual, readings: Complexes, enough: float 
         lengths = lengths.copy()
         lengths[: balance.meshes, POSITION] = 0.0
     products = 0
-    excess, tangent, _ = balance.forces(readings)
-    missing = readings - balance.static - balance.answer(excess)
-    error = float(np.linalg.norm(lengths * missing))
-    before = [np.inf] * PATIENCE
-    for _ in range(MOST_STEPS):
-        if error <= enough * size:
-            return readings, products
-        if error > STALLED * before[-PATIENCE]:
-            break
-        before.append(error)
-        step, took = tangent.solved(-missing)
-        products += took
-        share = 1.0
-        while True:
-            ahead = readings + share * step
-            excess, tangent, _ = balance.forces(ahead)
-            missing = ahead - balance.static - balance.answer(excess)
-            new = float(np.linalg.norm(lengths * missing))
-            if new < error or share < SHORTEST:
+    # Steps away from a balance may overflow; they are halved then, or the search is given up.
+    with np.errstate(over="ignore", invalid="ignore"):
+        excess, tangent, _ = balance.forces(readings)
+        missing = readings - balance.static - balance.answer(excess)
+        error = float(np.linalg.norm(lengths * missing))
+        before = [np.inf] * PATIENCE
+        for _ in range(MOST_STEPS):
+            if error <= enough * size:
+                return readings, products
+            if not error <= STALLED * before[-PATIENCE]:
                 break
-            share *= 0.5
-        readings = ahead
-        error = new
+            before.append(error)
+            step, took = tangent.solved(-missing)
+            products += took
+            share = 1.0
+            while True:
+                ahead = readings + share * step
+                excess, tangent, _ = balance.forces(ahead)
+                missing = ahead - balance.static - balance.answer(excess)
+                new = float(np.linalg.norm(lengths * missing))
+                if new < error or share < SHORTEST:
+                    break
+                share *= 0.5
+            readings = ahead
+            error = new
     raise HarmonicBalanceError(
         f"no steady state found at {balance.interface.speed:.5g} rad/s: the residual remains at {error / size:.1e} of "
         "the deflections"

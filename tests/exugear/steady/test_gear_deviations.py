@@ -10,9 +10,11 @@ import pytest
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.report.findings.ranking import ranking_of
+from exugear.steady.balance.nonlinear import HarmonicResidual, solve_balance
 from exugear.steady.balance.response import dissipated_and_given, signals
 from exugear.steady.findings import response_findings
-from exugear.steady.mean_system.mesh_places import DEFLECTION
+from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
+from exugear.steady.mean_system.mesh_places import DEFLECTION, POSITION
 from exugear.steady.peaks import line_name
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.settling import SettlingRun
@@ -205,6 +207,16 @@ def test_angles_of_the_mean_speed_keep_the_rms_of_a_run_where_the_gears_turn_far
     time, found, _ = run_from(solver.model, response, 2.0, 1.0 / 60e3, drive_of(solver.model, response), assembly)
     known = np.linalg.norm(signals(solver.model, response)[1:, 0]) * np.sqrt(2.0)
     assert known == pytest.approx(np.std(found[time > 1.0]), rel=0.05)
+
+
+def test_a_search_that_leaves_all_bounds_is_given_up_by_name():
+    """Squares of the positions overflow, which had ended the command."""
+    solver = solver_of(spur_assembly(one=RUN_OUT), SPEEDS, "nonlinear", 3)
+    balance = HarmonicResidual(solver.model, solver.model.at(100.0), solver.sampling)
+    readings = balance.static.copy()
+    readings[1:, :, POSITION] = 1e160
+    with pytest.raises(HarmonicBalanceError, match="no steady state found at 100 rad/s"):
+        solve_balance(balance, readings)
 
 
 def test_sidebands_of_second_order_are_kept_apart_from_those_that_are_solved():
