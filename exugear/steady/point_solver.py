@@ -406,7 +406,7 @@ def _refined(
 ) -> ContactLossState:
     """Solve at a speed, from given readings or the static state, with those lines more that it lacks.
 
-    `at_mean_angles` is whether that is tried first, as `solve_turning` has it.
+    `at_mean_angles` says which angles `solve_turning` tries first.
     """
     balance = HarmonicResidual(model, model.at(speed), model.sampling, at_mean_angles)
     readings = balance.static if start is None else start

@@ -566,12 +566,12 @@ def solve_turning(
 ) -> tuple[HarmonicResidual, Complexes, int]:
     """Solve the balance with meshes and stated loads at the angles that the vibration gives their bodies.
 
-    Where it turns the free gear train by more than `LARGEST_SHIFT`, as near standstill, their forces change by far more
-    orders than the balance has: they are at the angles of the mean speed then, as with the method `parametric`.
+    Where it turns the free gear train by more than `LARGEST_SHIFT`, as near standstill, their forces have far more
+    orders than the balance: they are at the angles of the mean speed then, as with the method `parametric`.
 
     Parameters
     ----------
-    balance : tried first with its angles; another speed nearby shows which
+    balance : its `at_mean_angles`, best that of a speed nearby, is tried first
     readings, enough : as of `solve_balance`
 
     Returns

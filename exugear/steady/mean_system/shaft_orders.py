@@ -70,7 +70,7 @@ on rows of rolling elements, whose stiffness follows the unequal loads.
 In the GRC with one displaced pin, sidebands are 2e-3 off those of a run with two of them, 1e-2 with one. On rows they
 are 2e-3 off at a resonance with four of them, 1e-1 with two."""
 FEW = 2
-"""Orders of a rotation up to which sums of three of them are kept apart from others, too: of ten there are hundreds."""
+"""Largest number of orders of a rotation of which sums of three are kept apart, too: ten orders have hundreds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,8 +144,8 @@ class ShaftOrders:
     def beside_sidebands(self) -> tuple[Sidebands, ...]:
         """Sidebands of twice as many harmonics, and sums of two of one mesh and rotation; of three where they are few.
 
-        Meshes have them whose positions they move. They are small, but so are high mesh orders, to whose frequencies
-        samples in time may map them.
+        They arise in meshes whose positions move with the orders. They are small, but so are high mesh orders, for
+        which samples in time would take them where both have the same values.
         """
         rotations = len(self.rotations)
         alike: dict[tuple[int, int | None, tuple[bool, ...]], set[tuple[int, ...]]] = {}
