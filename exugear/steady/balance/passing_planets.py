@@ -28,7 +28,8 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
-from scipy.linalg.lapack import zgetrs
+from numpy.lib.stride_tricks import as_strided
+from scipy.linalg.lapack import zgbtrf, zgbtrs
 
 from exugear.steady.balance.interface import Interface
 from exugear.steady.balance.model import HarmonicBalanceModel, turns_of_carrier
@@ -50,7 +51,9 @@ class SolvedGroups(NamedTuple):
     mirrored: Booleans
     """(g, n) whether a line is taken in as its conjugate."""
     factors: list[tuple[Complexes, Integers]]
-    """g of the equation (n s, n s) of the readings that vary, as `scipy.linalg.lu_factor` gives them."""
+    """g of the equation of the n s readings that vary, in a band, as LAPACK's zgbtrf gives them."""
+    width: int
+    """Of the band on either side of the diagonal."""
     coupled: tuple[Integers, Integers, Integers]
     """(p,) group, line, and line that it takes in, of each pair that is coupled."""
     blocks: Complexes
@@ -185,13 +188,21 @@ class PassingPlanets:
         rates = 1j * frequencies[..., None, None] * np.eye(count) + self._carried
         blocks = stiffness[turns] + self._of_damper[turns] @ rates[group, of]
         answering = np.where(mirrored[..., None, None], answers[places].conj(), answers[places])
-        matrix = np.zeros((groups, members, count, members, count), dtype=complex)
         # Products of arrays that are not in C order are slow.
         own = np.ascontiguousarray(answering[:, :, self._at])
-        matrix[group, to, :, of] = own[group, to] @ blocks
-        matrices = matrix.reshape(groups, members * count, -1) + np.eye(members * count)
-        factors = [scipy.linalg.lu_factor(own, overwrite_a=True, check_finite=False) for own in matrices]
-        return SolvedGroups(places, mirrored, factors, (group, to, of), blocks, answering)
+        size = members * count
+        width = min(count * (1 + int(np.abs(to - of).max())), size) - 1
+        # Entry (i, j) of a matrix is at 2 width + i - j of column j of its band.
+        height = 3 * width + 1
+        bands = np.zeros((groups, height * size + size), dtype=complex)
+        bands[:, 2 * width : height * size : height] = 1.0
+        group_step, step = bands.strides
+        steps = group_step, count * step, step, count * (height - 1) * step, (height - 1) * step
+        matrix = as_strided(bands[:, 2 * width :], (groups, members, count, members, count), steps)
+        matrix[group, to, :, of] += own[group, to] @ blocks
+        in_columns = bands[:, : height * size].reshape(groups, size, height)
+        factors = [zgbtrf(band.T, width, width, overwrite_ab=True)[:2] for band in in_columns]
+        return SolvedGroups(places, mirrored, factors, width, (group, to, of), blocks, answering)
 
     def solve(self, right: Complexes) -> Complexes:
         """Solve the equation (n, k) in which the mesh cycle does not vary."""
@@ -199,8 +210,8 @@ class PassingPlanets:
         for group in self._solved_groups:
             given = np.where(group.mirrored[..., None], right[group.lines].conj(), right[group.lines])
             varying = given[..., self._at].reshape(len(given), -1)
-            # Small systems: half of the time of `scipy.linalg.lu_solve` is not that of LAPACK.
-            own = [zgetrs(*factor, b)[0] for factor, b in zip(group.factors, varying, strict=True)]
+            width = group.width
+            own = [zgbtrs(lu, width, width, b, p)[0] for (lu, p), b in zip(group.factors, varying, strict=True)]
             found = np.array(own).reshape(*given.shape[:2], -1)
             at, to, of = group.coupled
             forces = np.zeros((*found.shape[:2], group.answers.shape[3]), dtype=complex)

@@ -44,7 +44,7 @@ from exugear.steady.mean_system.mesh_places import (
 )
 from exugear.system.kernels.coordinates import BODY_SIZE
 from exugear.system.kernels.meshes import TILT_DAMPING, TILT_STIFFNESS
-from fe_ste.tools.arrays import Complexes, Floats
+from fe_ste.tools.arrays import Complexes, Floats, Integers
 from fe_ste.tools.bundles import cached_bundle
 from fe_ste.tools.octets import SIZE
 
@@ -94,8 +94,14 @@ class Response:
     @cached_property
     def motion(self) -> Complexes:
         """Coefficients (n, size) of the motion about the static state, in the rotating frame."""
+        return self.motion_at(np.s_[:])
+
+    def motion_at(self, lines: Integers | slice) -> Complexes:
+        """Return the coefficients (q, size) of the motion at some lines alone."""
         excess = self.excess.reshape(len(self.excess), -1)
-        return _motion(self.interface, np.hstack([excess, self.of_bearings]) if self.of_bearings.size else excess)
+        return _motion(
+            self.interface, np.hstack([excess, self.of_bearings]) if self.of_bearings.size else excess, lines
+        )
 
     @property
     def torque(self) -> float:
@@ -106,16 +112,16 @@ class Response:
         return torque if self.interface.loads is None else torque + self.interface.loads.torque
 
 
-def _motion(interface: Interface, excess: Complexes) -> Complexes:
-    """Motion (n, size) about the static state under forces (n, m f + c) beyond the averaged system, and other loads."""
-    lines, size = interface.motion.shape[:2]
-    of_meshes = interface.motion.reshape(lines, size, -1)
-    found = of_meshes @ excess[:, : of_meshes.shape[2], None]
+def _motion(interface: Interface, excess: Complexes, lines: Integers | slice) -> Complexes:
+    """Motion (q, size) about the static state under forces (n, m f + c) beyond the averaged system, and other loads."""
+    of_meshes = interface.motion.reshape(*interface.motion.shape[:2], -1)
+    meshes = of_meshes.shape[2]
+    found = of_meshes[lines] @ excess[lines, :meshes, None]
     if interface.along_bearings.shape[2]:
-        found = found + interface.along_bearings @ excess[:, of_meshes.shape[2] :, None]
+        found = found + interface.along_bearings[lines] @ excess[lines, meshes:, None]
     if interface.loads is None:
         return np.asarray(-found[..., 0])
-    return np.asarray(interface.loads.motion - found[..., 0])
+    return np.asarray(interface.loads.motion[lines] - found[..., 0])
 
 
 def linear_response(model: HarmonicBalanceModel, interface: Interface) -> Response:
@@ -197,6 +203,7 @@ class SlowChanges:
     def __init__(self, model: HarmonicBalanceModel, interface: Interface) -> None:
         ports = interface.ports
         self._model = model
+        self._interface = interface
         self._ports = ports
         self._speed = interface.speed
         self._shape = len(model.lines.index), *ports.forces.shape[:2]
@@ -215,9 +222,9 @@ class SlowChanges:
             constants = _products_of_constants(self._model, given, ports, self._speed, everywhere)
         return flat(functions.at(ports, self._speed)), constants
 
-    def positions(self, motion: Complexes) -> Complexes:
-        """Return how far a motion (n, size) about the static state moves the positions (q, m), mesh cycles."""
-        return np.asarray(motion[self._lines] @ self._rows)
+    def positions(self, excess: Complexes) -> Complexes:
+        """Return how far the motion under forces (n, m f + c) moves the positions (q, m), mesh cycles."""
+        return np.asarray(_motion(self._interface, excess, self._lines) @ self._rows)
 
     def forces(self, deflections: Complexes, positions: Complexes) -> Complexes:
         """Find the forces (n, m, f), N, at deflections (n, m) and `positions` (q, m)."""
@@ -313,7 +320,7 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
             if 2.0 * change**2 < TOLERANCE:
                 break
         if again and slow is not None:
-            positions = slow.positions(_motion(interface, excess))
+            positions = slow.positions(excess)
             too_far = bool((2.0 * np.abs(positions)).sum(axis=0).max(initial=0.0) > LARGEST_SHIFT)
             moved = np.zeros_like(given) if too_far else slow.forces(deflection, positions)
         if again and model.varying:
@@ -400,7 +407,7 @@ def at_mean_positions(model: HarmonicBalanceModel, interface: Interface, respons
     Passing planets wind up the gear train of the GRC by 3e-5 rad: 5e-2 rad of the fifth harmonic of its fastest mesh.
     """
     ports = interface.ports
-    moved = response.motion[0].real @ ports.readings[:, POSITION].T
+    moved = response.motion_at(np.s_[:1])[0].real @ ports.readings[:, POSITION].T
     means = np.array([wave.wave == 0 for wave in model.waves.waves])
     static = ports.static.copy()
     static[:, POSITION] += np.where(means, 0.0, moved)

@@ -125,8 +125,12 @@ class Elimination(NamedTuple):
     """(n + 1,) first entry of each row."""
     diagonal: Integers
     """(n,) entry on the diagonal."""
+    kept: Integers
+    """(n + 1,) place of the diagonal among the entries on and above the diagonals, which later steps need."""
     alike: Booleans
     """(n,) whether the next step touches the same later rows: both are taken out of these at once."""
+    twin: Booleans
+    """(n,) whether the next row has entries in the same columns: steps are taken out of both at once."""
 
 
 def elimination(pattern: Booleans) -> Elimination:
@@ -151,17 +155,19 @@ def elimination(pattern: Booleans) -> Elimination:
         left[k] = False
         others = np.flatnonzero(filled[k] & left)
         filled[np.ix_(others, others)] = True
-    filled = np.triu(filled[np.ix_(order, order)])
-    row, column = np.nonzero(filled | filled.T)
-    own, following = (filled[:-1], filled[1:])
-    alike = (own == following).sum(axis=1) == n - 1  # but for the diagonal of the first
+    above = np.triu(filled[np.ix_(order, order)])
+    whole = above | above.T
+    row, column = np.nonzero(whole)
+    alike = (above[:-1] == above[1:]).sum(axis=1) == n - 1  # but for the diagonal of the first
     return Elimination(
         order=order,
         row=row.astype(np.int64),
         column=column.astype(np.int64),
         first=np.searchsorted(row, np.arange(n + 1)).astype(np.int64),
         diagonal=np.flatnonzero(row == column).astype(np.int64),
+        kept=np.append(0, np.cumsum(above.sum(axis=1))).astype(np.int64),
         alike=np.append(alike, False),
+        twin=np.append((whole[:-1] == whole[1:]).all(axis=1), False),
     )
 
 
@@ -227,7 +233,7 @@ def solve_side_by_side(
     alone = np.append(own[loaded] / sizes[:, None], np.zeros((1, len(order))), axis=0)
     place = np.full(len(own), len(loaded), dtype=np.int64)
     place[loaded] = np.arange(len(loaded))
-    matrix = aligned_zeros(2 * SIZE * max(len(plan.row), 2 * len(order)))
+    upper = aligned_zeros(2 * SIZE * max(plan.kept[-1], 2 * len(order)))
     x = aligned_zeros(2 * SIZE * len(order) * (loads.shape[1] + 2))
     of_loads = np.ascontiguousarray(loads[order]), np.ascontiguousarray(alone[:, order]).view(np.float64)
     missing = np.zeros(len(frequencies))
@@ -240,8 +246,8 @@ def solve_side_by_side(
         frequencies,
         *of_loads,
         place,
-        matrix,
-        np.zeros(len(order), dtype=np.int64),
+        upper,
+        aligned_zeros(4 * SIZE * len(order)),
         x,
         amplitudes.view(np.float64),
         found.view(np.float64),
@@ -267,8 +273,8 @@ def solve_octets(
     loads: Floats,
     own: Floats,
     place: Integers,
-    matrix: Floats,
-    entries: Integers,
+    upper: Floats,
+    rows: Floats,
     x: Floats,
     out: Floats,
     out_own: Floats,
@@ -277,8 +283,8 @@ def solve_octets(
     """Fill amplitudes (lines, n, 2 cases), those of own loads (rows, 2 n), and residuals over loads (lines,).
 
     Real and imaginary parts are in turns. Matrices are given by their entries (e,), loads (n, cases) and own loads
-    (rows, 2 n) in the order of the elimination; `place` (lines,) is the row of each line. `matrix` (16 e, or 32 n if
-    that is more), `entries` (n,) and `x` (16 n (cases + 2),) are memory.
+    (rows, 2 n) in the order of the elimination; `place` (lines,) is the row of each line. `upper` (16 for each entry
+    on and above the diagonals, or 32 n if that is more), `rows` (32 n,) and `x` (16 n (cases + 2),) are memory.
     """
     size = plan.order.size
     lines = batches.lines.size
@@ -291,11 +297,10 @@ def solve_octets(
         if cases == 0:
             continue
         w = frequencies_of(begin, count, batches.lines, frequencies, x)
-        for entry in range(stiffness.size):
-            put(matrix, 2 * SIZE * entry, stiffness[entry] - w * w * mass[entry])
-            put(matrix, 2 * SIZE * entry + SIZE, w * damping[entry])
         put_loads(begin, count, octet, batches, loads, own, place, x)
-        eliminate(plan, cases, matrix, entries, x)
+        eliminate(plan, cases, stiffness, damping, mass, w, rows, upper, x)
+        for k in range(size - 1, -1, -1):
+            substitute_back(k, cases, plan, upper, x)
         for lane in range(count):
             line = batches.lines[begin + lane]
             for k in range(size):
@@ -309,9 +314,9 @@ def solve_octets(
                 if shared < cases:
                     out_own[place[line], 2 * row] = x[at]
                     out_own[place[line], 2 * row + 1] = x[at + SIZE]
-        scale = add_cases(size, cases, matrix, x)
+        scale = add_cases(size, cases, upper, x)
         frequencies_of(begin, count, batches.lines, frequencies, x)
-        leave_over(plan, stiffness, damping, mass, matrix, x)
+        leave_over(plan, stiffness, damping, mass, upper, x)
         for lane in range(count):
             missing[batches.lines[begin + lane]] = math.sqrt(x[lane]) / scale
 
@@ -402,117 +407,181 @@ def leave_over(plan: Elimination, stiffness: Floats, damping: Floats, mass: Floa
 
 
 @kernel
-def eliminate(plan: Elimination, cases: int, matrix: Floats, entries: Integers, x: Floats) -> None:
-    """Solve eight systems, whose entries (16 e,) are overwritten, for a number of loads, which become the solutions.
+def eliminate(
+    plan: Elimination,
+    cases: int,
+    stiffness: Floats,
+    damping: Floats,
+    mass: Floats,
+    w: Floats,
+    rows: Floats,
+    upper: Floats,
+    x: Floats,
+) -> None:
+    """Eliminate eight systems at frequencies w for a number of loads, to triangles whose diagonals are inverted.
 
-    All earlier steps are taken out of one row after the other, whose `entries` (n,) are found by their columns.
+    All earlier steps are taken out of one row after the other, or of two with entries in the same columns. `rows`
+    (32 n,) has them by column: they stay near the processor, and so do earlier rows, of which two are read at once.
     """
     size = plan.order.size
-    for i in range(size):
-        for entry in range(plan.first[i], plan.first[i + 1]):
-            entries[plan.column[entry]] = entry
+    second = 2 * SIZE * size
+    i = 0
+    while i < size:
+        two = plan.twin[i]
+        put_row(i, plan, stiffness, damping, mass, w, rows, 0)
+        if two:
+            put_row(i + 1, plan, stiffness, damping, mass, w, rows, second)
         entry = plan.first[i]
         while entry < plan.diagonal[i]:
             k = plan.column[entry]
-            if plan.alike[k] and k + 1 < i:
-                take_out_two(k, i, entries, cases, plan, matrix, x)
-                entry += 2
-            else:
-                take_out(k, i, entries, cases, plan, matrix, x)
+            if two and plan.alike[k] and k + 1 < i:
+                take_out_two(k, i, cases, plan, upper, rows, x)
                 entry += 1
-        invert(2 * SIZE * plan.diagonal[i], matrix)
-    for k in range(size - 1, -1, -1):
-        substitute_back(k, cases, plan, matrix, x)
+            else:
+                take_out(k, i, cases, plan, upper, rows, 0, x)
+                if two:
+                    take_out(k, i + 1, cases, plan, upper, rows, second, x)
+            entry += 1
+        keep_row(i, plan, rows, 0, upper)
+        if two:
+            take_out(i, i + 1, cases, plan, upper, rows, second, x)
+            keep_row(i + 1, plan, rows, second, upper)
+            i += 1
+        i += 1
 
 
 @kernel
-def invert(at: int, matrix: Floats) -> None:
-    """Take the inverse of the eight entries at a place."""
-    for i in range(at, at + SIZE):
-        square = matrix[i] * matrix[i] + matrix[i + SIZE] * matrix[i + SIZE]
-        matrix[i], matrix[i + SIZE] = matrix[i] / square, -matrix[i + SIZE] / square
+def put_row(
+    i: int,
+    plan: Elimination,
+    stiffness: Floats,
+    damping: Floats,
+    mass: Floats,
+    w: Floats,
+    rows: Floats,
+    begin: int,
+) -> None:
+    """Put the entries of the row of step i at eight frequencies into `rows`, by their columns from a place on."""
+    for entry in range(plan.first[i], plan.first[i + 1]):
+        at = begin + 2 * SIZE * plan.column[entry]
+        put(rows, at, stiffness[entry] - w * w * mass[entry])
+        put(rows, at + SIZE, w * damping[entry])
 
 
 @kernel
-def over_diagonal(k: int, a: Floats, b: Floats, plan: Elimination, matrix: Floats) -> tuple[Floats, Floats]:
-    """Divide eight numbers a + i b by the diagonal of step k, whose inverse stands there."""
-    x = eight(matrix, 2 * SIZE * plan.diagonal[k])
-    y = eight(matrix, 2 * SIZE * plan.diagonal[k] + SIZE)
+def keep_row(i: int, plan: Elimination, rows: Floats, begin: int, upper: Floats) -> None:
+    """Keep what steps after i need of its row, which is in `rows` from a place on: the diagonal is inverted."""
+    to = 2 * SIZE * plan.kept[i]
+    for entry in range(plan.diagonal[i], plan.first[i + 1]):
+        at = begin + 2 * SIZE * plan.column[entry]
+        put(upper, to, eight(rows, at))
+        put(upper, to + SIZE, eight(rows, at + SIZE))
+        to += 2 * SIZE
+    at = 2 * SIZE * plan.kept[i]
+    for lane in range(at, at + SIZE):
+        square = upper[lane] * upper[lane] + upper[lane + SIZE] * upper[lane + SIZE]
+        upper[lane], upper[lane + SIZE] = upper[lane] / square, -upper[lane + SIZE] / square
+
+
+@kernel
+def times_entry(at: int, a: Floats, b: Floats, upper: Floats) -> tuple[Floats, Floats]:
+    """Multiply eight numbers a + i b by the entry at a place: an inverted diagonal."""
+    x = eight(upper, at)
+    y = eight(upper, at + SIZE)
     return a * x - b * y, a * y + b * x
 
 
 @kernel
-def take_out(k: int, i: int, entries: Integers, cases: int, plan: Elimination, matrix: Floats, out: Floats) -> None:
-    """Take step k, its diagonal inverted, out of the row of step i, whose entries (n,) are given by their columns."""
-    at = 2 * SIZE * entries[k]
-    factor, turned = over_diagonal(k, eight(matrix, at), eight(matrix, at + SIZE), plan, matrix)
+def take_out(
+    k: int, i: int, cases: int, plan: Elimination, upper: Floats, rows: Floats, begin: int, out: Floats
+) -> None:
+    """Take step k out of the row of step i, which is in `rows` from a place on."""
+    at = 2 * SIZE * plan.kept[k]
+    to = begin + 2 * SIZE * k
+    f, g = times_entry(at, eight(rows, to), eight(rows, to + SIZE), upper)
     for entry in range(plan.diagonal[k] + 1, plan.first[k + 1]):
-        at = 2 * SIZE * entry
-        to = 2 * SIZE * entries[plan.column[entry]]
-        a = eight(matrix, at)
-        b = eight(matrix, at + SIZE)
-        put(matrix, to, eight(matrix, to) - factor * a + turned * b)
-        put(matrix, to + SIZE, eight(matrix, to + SIZE) - factor * b - turned * a)
+        at += 2 * SIZE
+        to = begin + 2 * SIZE * plan.column[entry]
+        a = eight(upper, at)
+        b = eight(upper, at + SIZE)
+        put(rows, to, eight(rows, to) - f * a + g * b)
+        put(rows, to + SIZE, eight(rows, to + SIZE) - f * b - g * a)
     for case in range(cases):
         at = 2 * SIZE * (k * cases + case)
         to = 2 * SIZE * (i * cases + case)
         a = eight(out, at)
         b = eight(out, at + SIZE)
-        put(out, to, eight(out, to) - factor * a + turned * b)
-        put(out, to + SIZE, eight(out, to + SIZE) - factor * b - turned * a)
+        put(out, to, eight(out, to) - f * a + g * b)
+        put(out, to + SIZE, eight(out, to + SIZE) - f * b - g * a)
 
 
 @kernel
-def take_out_two(k: int, i: int, entries: Integers, cases: int, plan: Elimination, matrix: Floats, out: Floats) -> None:
-    """Take steps k and k + 1, which touch the same later rows, out of the row of step i: it is passed once."""
-    at = 2 * SIZE * entries[k]
-    factor, turned = over_diagonal(k, eight(matrix, at), eight(matrix, at + SIZE), plan, matrix)
-    # The entry below the second diagonal without the first step, over that diagonal.
-    at = 2 * SIZE * (plan.diagonal[k] + 1)
-    to = 2 * SIZE * entries[k + 1]
-    a = eight(matrix, at)
-    b = eight(matrix, at + SIZE)
-    c = eight(matrix, to) - factor * a + turned * b
-    d = eight(matrix, to + SIZE) - factor * b - turned * a
-    second, second_turned = over_diagonal(k + 1, c, d, plan, matrix)
-    begin = plan.diagonal[k] + 2
-    ahead = plan.diagonal[k + 1] + 1 - begin
-    for entry in range(begin, plan.first[k + 1]):
-        at = 2 * SIZE * entry
-        to = 2 * SIZE * entries[plan.column[entry]]
-        a = eight(matrix, at)
-        b = eight(matrix, at + SIZE)
-        c = eight(matrix, at + 2 * SIZE * ahead)
-        d = eight(matrix, at + 2 * SIZE * ahead + SIZE)
-        put(matrix, to, eight(matrix, to) - factor * a + turned * b - second * c + second_turned * d)
-        put(matrix, to + SIZE, eight(matrix, to + SIZE) - factor * b - turned * a - second * d - second_turned * c)
+def take_out_two(k: int, i: int, cases: int, plan: Elimination, upper: Floats, rows: Floats, out: Floats) -> None:
+    """Take steps k and k + 1, which touch the same later rows, out of the rows of steps i and i + 1 in `rows`."""
+    further = 2 * SIZE * plan.order.size
+    at = 2 * SIZE * plan.kept[k]
+    next_at = 2 * SIZE * plan.kept[k + 1]
+    to = 2 * SIZE * k
+    f0, g0 = times_entry(at, eight(rows, to), eight(rows, to + SIZE), upper)
+    f1, g1 = times_entry(at, eight(rows, to + further), eight(rows, to + further + SIZE), upper)
+    # The entries below the second diagonal without the first step, times the inverse of that diagonal.
+    at += 2 * SIZE
+    to += 2 * SIZE
+    a = eight(upper, at)
+    b = eight(upper, at + SIZE)
+    c = eight(rows, to) - f0 * a + g0 * b
+    d = eight(rows, to + SIZE) - f0 * b - g0 * a
+    s0, t0 = times_entry(next_at, c, d, upper)
+    to += further
+    c = eight(rows, to) - f1 * a + g1 * b
+    d = eight(rows, to + SIZE) - f1 * b - g1 * a
+    s1, t1 = times_entry(next_at, c, d, upper)
+    for entry in range(plan.diagonal[k] + 2, plan.first[k + 1]):
+        at += 2 * SIZE
+        next_at += 2 * SIZE
+        to = 2 * SIZE * plan.column[entry]
+        a = eight(upper, at)
+        b = eight(upper, at + SIZE)
+        c = eight(upper, next_at)
+        d = eight(upper, next_at + SIZE)
+        put(rows, to, eight(rows, to) - f0 * a + g0 * b - s0 * c + t0 * d)
+        put(rows, to + SIZE, eight(rows, to + SIZE) - f0 * b - g0 * a - s0 * d - t0 * c)
+        to += further
+        put(rows, to, eight(rows, to) - f1 * a + g1 * b - s1 * c + t1 * d)
+        put(rows, to + SIZE, eight(rows, to + SIZE) - f1 * b - g1 * a - s1 * d - t1 * c)
+    of_row = 2 * SIZE * cases
     for case in range(cases):
         at = 2 * SIZE * (k * cases + case)
         to = 2 * SIZE * (i * cases + case)
         a = eight(out, at)
         b = eight(out, at + SIZE)
-        c = eight(out, at + 2 * SIZE * cases)
-        d = eight(out, at + 2 * SIZE * cases + SIZE)
-        put(out, to, eight(out, to) - factor * a + turned * b - second * c + second_turned * d)
-        put(out, to + SIZE, eight(out, to + SIZE) - factor * b - turned * a - second * d - second_turned * c)
+        c = eight(out, at + of_row)
+        d = eight(out, at + of_row + SIZE)
+        put(out, to, eight(out, to) - f0 * a + g0 * b - s0 * c + t0 * d)
+        put(out, to + SIZE, eight(out, to + SIZE) - f0 * b - g0 * a - s0 * d - t0 * c)
+        to += of_row
+        put(out, to, eight(out, to) - f1 * a + g1 * b - s1 * c + t1 * d)
+        put(out, to + SIZE, eight(out, to + SIZE) - f1 * b - g1 * a - s1 * d - t1 * c)
 
 
 @kernel
-def substitute_back(k: int, cases: int, plan: Elimination, matrix: Floats, out: Floats) -> None:
+def substitute_back(k: int, cases: int, plan: Elimination, upper: Floats, out: Floats) -> None:
     """Find the solution of step k from those of later ones."""
+    diagonal = 2 * SIZE * plan.kept[k]
     for case in range(cases):
         to = 2 * SIZE * (k * cases + case)
         p = eight(out, to)
         q = eight(out, to + SIZE)
+        at = diagonal
         for entry in range(plan.diagonal[k] + 1, plan.first[k + 1]):
-            at = 2 * SIZE * entry
+            at += 2 * SIZE
             known = 2 * SIZE * (plan.column[entry] * cases + case)
-            a = eight(matrix, at)
-            b = eight(matrix, at + SIZE)
+            a = eight(upper, at)
+            b = eight(upper, at + SIZE)
             c = eight(out, known)
             d = eight(out, known + SIZE)
             p = p - a * c + b * d
             q = q - a * d - b * c
-        p, q = over_diagonal(k, p, q, plan, matrix)
+        p, q = times_entry(diagonal, p, q, upper)
         put(out, to, p)
         put(out, to + SIZE, q)
