@@ -23,7 +23,7 @@ from exugear.gearbox.load_cases import BURSTING_RIM_SPEED, LoadSummary, rim_radi
 from exugear.results.folder import read_stored_gearbox
 from exugear.results.spectra.diagrams import draw_levels, draw_waterfall
 from exugear.results.spectra.waterfall import order_lines
-from exugear.system.signals import BALANCE_TERMS, MESH_TIMES
+from exugear.system.signals import ELASTIC, KINETIC, MESH_TIMES, energy_left_over
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin, TitledRows
@@ -191,18 +191,12 @@ AT_START, SCALE = range(2)
 """Columns of the row `ACCOUNT`: energy that the account began with, and the largest so far, J."""
 MONITOR_SHAPE = (5, 3)
 """Shape of the monitored values."""
-WORK_OF_LOADS, KINETIC, ELASTIC = map(BALANCE_TERMS.index, ("work_of_loads", "kinetic_energy", "elastic_energy"))
-"""Terms of the account that say how much energy there is; what varying stiffness pumps in shows up in them."""
-EXPLAINING = [number for number, term in enumerate(BALANCE_TERMS) if term != "work_of_loads"]
-"""Terms of the account that explain where the work of the loads went."""
 TENSILE_ROW = MESH_TIMES.index("tensile_time")
 """Row of the times of meshes in which they pull."""
 NOT_CONVERGED_ROW = MESH_TIMES.index("interpolation_time")
 """Row of the times in which they read a table next to states that have not converged."""
 WHOLLY = 0.9
 """Part of a run with tensile mesh force from which it is load on the other flank, not oscillation about zero load."""
-LEAST_ENERGY = 1e-9
-"""Energy that counts as none, J: a train at rest has nothing but round-off to account for."""
 
 
 @dataclass(frozen=True)
@@ -238,31 +232,6 @@ class Limits:
 
 
 LIMITS = Limits()
-
-
-def energy_left_over(lines: Floats, start: float, scale: float) -> tuple[Floats, Floats]:
-    """Energy that lines of the account (n, terms), J, do not explain, as a part of the largest energy so far.
-
-    Parameters
-    ----------
-    start : kinetic and elastic energy at the start, J
-    scale : largest of work done, kinetic and elastic energy before these lines, J
-
-    Returns
-    -------
-    share, scales : (n,) without sign; and the largest energy up to each line, J, at least `LEAST_ENERGY`
-
-    Examples
-    --------
-    >>> lines = np.zeros((3, len(BALANCE_TERMS)))
-    >>> lines[:, :3] = [[0.0, 0.0, 1.0], [9.0, 9.0, 1.0], [10.0, 9.0, 1.0]]
-    >>> energy_left_over(lines, start=1.0, scale=0.0)[0]
-    array([0. , 0. , 0.1])
-    """
-    largest = np.abs(lines[:, [WORK_OF_LOADS, KINETIC, ELASTIC]]).max(axis=1)
-    scales = np.maximum.accumulate(np.maximum(largest, max(scale, LEAST_ENERGY)))
-    explained = lines[:, EXPLAINING].sum(axis=1) - start
-    return np.abs(lines[:, WORK_OF_LOADS] - explained) / scales, scales
 
 
 class ValidityMonitor:
