@@ -324,6 +324,8 @@ def friction_warning(gearbox: Gearbox, loads: LoadSummary) -> str:
 def other_load_warning(gearbox: Gearbox, loads: LoadSummary, uses_single_load: bool = True) -> str:
     """Return a warning that names meshes with another load than the static one of their STE tables; empty if none.
 
+    A stated stiffness is the same under all loads.
+
     Parameters
     ----------
     uses_single_load : whether the mesh model evaluates tables at the static load only
@@ -336,17 +338,19 @@ def other_load_warning(gearbox: Gearbox, loads: LoadSummary, uses_single_load: b
     'other load: sun_planet 50 %, ring_planet 50 %, intermediate 50 %, high_speed 50 % of the static load ...
     """
     entries = []
+    stated = {mesh.family for mesh in gearbox.meshes if mesh.pair.name in gearbox.stated_stiffness}
     for family, least in loads.least_shares.items():
         greatest = loads.greatest_shares[family]
-        if least < 1.0 - OTHER_LOAD or greatest > 1.0 + OTHER_LOAD:
-            shares = dict.fromkeys(f"{100.0 * share:.0f}" for share in (least, greatest))
+        if family not in stated and (least < 1.0 - OTHER_LOAD or greatest > 1.0 + OTHER_LOAD):
+            shares = dict.fromkeys(str(round(100.0 * share)) for share in (least, greatest))
             entries.append(f"{family} {' to '.join(shares)} %")
     if not entries or not uses_single_load:
         return ""
+    loaded_at_start = _torques_at_start(gearbox, gearbox.load_cases[loads.name])
+    advice = "add --at-load-case to the command run, or use" if loaded_at_start else "use"
     return (
         f"other load: {', '.join(entries)} of the static load ({static_load_in_words(gearbox)}), at which transmission "
-        "error and stiffness are computed; add --at-load-case to the command run, or use --mesh-model table, which "
-        "covers a range of loads"
+        f"error and stiffness are computed; {advice} --mesh-model table, which covers a range of loads"
     )
 
 
@@ -461,15 +465,20 @@ def gearbox_at_load(gearbox: Gearbox, case: LoadCase) -> Gearbox:
     >>> gearbox_at_load(gearbox, gearbox.load_cases["rated"]).case.static_load.torques_N_m
     {'carrier': 240000.0}
     """
-    first = {body: float(values[0]) for body, (_, values) in torque_series(gearbox, case).items()}
-    locked = gearbox.case.static_load.locked
-    torques = {body: torque for body, torque in {**case.torques, **first}.items() if torque and body not in locked}
+    torques = _torques_at_start(gearbox, case)
     if not torques:
         raise gearbox.error(
-            f"load_cases.{case.name}.torques_N_m: at the start, torques act only on bodies that hold the static load ("
-            f"{', '.join(locked)}), so nothing is loaded; choose another load case"
+            f"load_cases.{case.name}.torques_N_m: at the start, no torque acts except on bodies that hold the static "
+            f"load ({', '.join(gearbox.case.static_load.locked)}), so nothing is loaded; choose another load case"
         )
     return gearbox.varied({"static_load.torques_N_m": torques})
+
+
+def _torques_at_start(gearbox: Gearbox, case: LoadCase) -> dict[str, float]:
+    """Torques of a load case at its start, N m, on bodies that do not hold the static load."""
+    first = {body: float(values[0]) for body, (_, values) in torque_series(gearbox, case).items()}
+    locked = gearbox.case.static_load.locked
+    return {body: torque for body, torque in {**case.torques, **first}.items() if torque and body not in locked}
 
 
 def rim_radii(gearbox: Gearbox) -> dict[str, float]:

@@ -23,11 +23,14 @@ from exugear.gearbox.load_cases import (
 )
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.units import RPM
+from exugear.results.run_file import load_run
 from exugear.system.build import assemble
 from exugear.system.statics import accelerating_start
+from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.transient.runup import simulate
 
 from ...cases.command import exugear
+from ...cases.gear_trains import pair
 from ...cases.spur import SPUR_CASE
 
 INERTIA = 1e-2 + 3e-2 / 2.25
@@ -204,12 +207,34 @@ def test_a_load_case_thirty_percent_off_the_load_of_the_tables_is_told(torque, s
     assert bool(said) == bool(doubt)
 
 
+def test_a_load_case_without_torque_is_told_what_helps():
+    """Without torque on the first shaft there is no load to compute tables at: `--at-load-case` would be refused."""
+    gearbox = spur(torques_N_m={"shaft_1": 0.0, "shaft_2": -1e-9})
+    doubt = other_load_warning(gearbox, summarise_loads(gearbox, gearbox.load_cases["run_up"]))
+    assert "spur 0 % of the static load" in doubt
+    assert doubt.endswith("are computed; use --mesh-model table, which covers a range of loads")
+
+
+def test_a_stated_stiffness_has_no_other_load(tmp_path):
+    """A run is the same to the bit with the static load of the file and with that of the load case."""
+    doubled = {name: 2.0 * torque for name, torque in pair()["load_cases"]["steady"]["torques_N_m"].items()}
+    gearbox = Gearbox.from_dict(pair()).varied({"load_cases.steady.torques_N_m": doubled})
+    case = gearbox.load_cases["steady"]
+    assert other_load_warning(gearbox, summarise_loads(gearbox, case)) == ""
+    forces = []
+    for name, own in (("static", gearbox), ("case", gearbox_at_load(gearbox, case))):
+        stiffness = mesh_stiffness(own, "line_of_action", tmp_path)
+        run = simulate(own, Choice("bushing"), stiffness, tmp_path / name, duration=0.01)
+        forces.append(load_run(run.path)["mesh_force"].to_numpy())
+    assert (forces[0] == forces[1]).all()
+
+
 def test_a_load_case_becomes_the_static_load_with_what_holds_it():
     gearbox = spur(torques_N_m={"shaft_1": 40.0, "shaft_2": 60.0})
     static = gearbox_at_load(gearbox, gearbox.load_cases["run_up"]).case.static_load
     assert static.torques_N_m == {"shaft_1": 40.0}
     assert static.locked == ("shaft_2",)
     with pytest.raises(
-        GearboxFileError, match=".torques_N_m: at the start, torques act only on bodies that hold the static load"
+        GearboxFileError, match=".torques_N_m: at the start, no torque acts except on bodies that hold the static load"
     ):
         gearbox_at_load(gearbox, spur(torques_N_m={"shaft_2": 60.0}).load_cases["run_up"])
