@@ -129,6 +129,8 @@ class _RatedBearing:
             for row in raceway_rows(catalogue_rows(section))
         )
         ratings = ratings_of(section)
+        if max(np.abs(forces[..., :3]).max() for forces in (loads, worst)) < UNLOADED * ratings.static:
+            loads, worst = np.zeros_like(loads), np.zeros_like(worst)
         revolutions = points.revolutions * turns
         share = revolutions[:, None] / loads.shape[1]
         radial = np.hypot(loads[..., 0], loads[..., 1])
@@ -233,7 +235,7 @@ class _RatedBearing:
             self.balance.bearing_tilt.of(self.number), points.torque[t : t + 1], points.other[t : t + 1]
         )
         load, tilt, top = loads[t, a], tilts[0, a], np.hypot(worst[..., 0], worst[..., 1]).max()
-        if not size[t, a] or np.abs(worst[..., :3]).max() < UNLOADED * ratings.static:
+        if not size[t, a]:
             return None, math.nan, ["no load: elements may slide"]
         holds_axially = any(row.contact_angle for row in rows) or not isinstance(rows[0], RollerRow)
         remarks = []

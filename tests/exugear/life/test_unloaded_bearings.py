@@ -21,13 +21,18 @@ def test_a_bearing_without_load_has_no_life_and_says_so(tmp_path: Path) -> None:
     gearbox = Gearbox.from_dict(tomllib.loads(template("planetary"))).varied({"ste.positions": 8})
     life = Project(gearbox, tmp_path, Choice("bushing")).life()
     remarks = json.loads(life.attrs["bearing_remarks"])
-    for name, load, reference in zip(
+    for name, load, reference, damage, hours, safety in zip(
         life["bearing"].to_numpy().tolist(),
         life["bearing_largest_load"].to_numpy(),
         life["bearing_reference_damage"].to_numpy(),
+        life["bearing_damage"].to_numpy(),
+        life["bearing_basic_hours"].to_numpy(),
+        life["bearing_static_safety"].to_numpy(),
         strict=True,
     ):
         carries = name.startswith("planet")
+        if not carries:
+            assert load == damage == 0.0 and np.isinf(hours) and np.isinf(safety)
         assert (load > 1.0) == carries and np.isfinite(reference) == carries
         assert ("no load: elements may slide" in remarks.get(name, ())) == (not carries)
         assert not any("equilibrium" in line for line in remarks.get(name, ()))
