@@ -14,7 +14,7 @@ MODES = 5
 #: Runs in time (`exugear.transient`, both solvers, the models, signals and filters).
 RUN = 12
 #: Life of gears and bearings (`exugear.life`, and the root stress of `fe_ste.root_stress`).
-LIFE = 11
+LIFE = 12
 #: Steady-state responses (`exugear.steady`, and all methods that modes use).
 STEADY = 33
 #: Comparisons with measured run-ups (`exugear.steady.evaluation`, `exugear.results.order_tracking`).

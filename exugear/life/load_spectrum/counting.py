@@ -31,13 +31,15 @@ class DurationDistribution(ReprMixin):
     hours: Floats
     revolutions: Floats
     """(bins,) of the loaded shaft."""
+    running_speed: Floats
+    """(bins,) mean absolute speed, weighted by revolutions, rad/s: hours at standstill leave it as it is."""
 
     def _line(self) -> str:
         return f": {len(self.hours)} bins, {self.hours.sum():.6g} h"
 
     @property
     def speed(self) -> Floats:
-        """Mean absolute speed of each bin, rad/s."""
+        """Mean absolute speed of each bin over its hours, rad/s."""
         seconds = 3600.0 * self.hours
         return np.divide(2.0 * np.pi * self.revolutions, seconds, out=np.zeros_like(seconds), where=seconds > 0.0)
 
@@ -71,7 +73,8 @@ def load_duration(
     numbers, inverse = np.unique(place, return_inverse=True)
     total_hours = np.bincount(inverse, hours).astype(np.float64)
     revolutions = np.bincount(inverse, turns).astype(np.float64)
-    by_turns = np.bincount(inverse, turns * torque) / np.where(revolutions > 0.0, revolutions, 1.0)
+    some_turns = np.where(revolutions > 0.0, revolutions, 1.0)
+    by_turns = np.bincount(inverse, turns * torque) / some_turns
     by_hours = np.bincount(inverse, hours * torque) / np.where(total_hours > 0.0, total_hours, 1.0)
     sense = np.sign(numbers)
     return DurationDistribution(
@@ -80,6 +83,7 @@ def load_duration(
         torque=np.where(revolutions > 0.0, by_turns, by_hours),
         hours=total_hours,
         revolutions=revolutions,
+        running_speed=np.bincount(inverse, turns * np.abs(speed)) / some_turns,
     )
 
 
@@ -94,17 +98,13 @@ class LoadPoints(ReprMixin):
     hours: Floats
     revolutions: Floats
     """(points,)"""
+    speed: Floats
+    """(points,) mean absolute speed, weighted by revolutions, rad/s."""
     bin: Integers
     """(points,) index of the distribution's bin."""
 
     def _line(self) -> str:
         return f": {len(self.hours)} points, {self.hours.sum():.6g} h"
-
-    @property
-    def speed(self) -> Floats:
-        """Mean absolute speed of each point, rad/s."""
-        seconds = 3600.0 * self.hours
-        return np.divide(2.0 * np.pi * self.revolutions, seconds, out=np.zeros_like(seconds), where=seconds > 0.0)
 
 
 def load_points(
@@ -128,8 +128,14 @@ def load_points(
     """
     torques = distribution.torques(value)
     if not other.any():
-        zeros = np.zeros((len(torques), other.shape[1]))
-        return LoadPoints(torques, zeros, distribution.hours, distribution.revolutions, np.arange(len(torques)))
+        return LoadPoints(
+            torques,
+            np.zeros((len(torques), other.shape[1])),
+            distribution.hours,
+            distribution.revolutions,
+            distribution.running_speed,
+            np.arange(len(torques)),
+        )
     width = float(np.abs(distribution.upper - distribution.lower)[0])
     side = np.where(torque < 0.0, -1.0, 1.0)
     place = side * np.minimum(
@@ -145,10 +151,12 @@ def load_points(
     inverse = inverse.ravel()
     turns = np.abs(speed) * hours * 3600.0 / (2.0 * np.pi)
     total = np.bincount(inverse, turns).astype(np.float64)
-    means = [np.bincount(inverse, turns * column) / np.where(total > 0.0, total, 1.0) for column in other.T]
+    *means, running_speed = (
+        np.bincount(inverse, turns * column) / np.where(total > 0.0, total, 1.0) for column in (*other.T, np.abs(speed))
+    )
     bins = keys[:, 0].astype(np.int64)
     lasting = np.bincount(inverse, hours).astype(np.float64)
-    return LoadPoints(torques[bins], np.array(means).T, lasting, total, bins)
+    return LoadPoints(torques[bins], np.array(means).T, lasting, total, running_speed, bins)
 
 
 def equivalent_load(load: Floats, cycles: Floats, exponent: float) -> float:

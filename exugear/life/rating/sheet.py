@@ -394,7 +394,12 @@ def nominal_loads(gearbox: Gearbox, rating: RatingSection, factor: float = 1.0) 
         sources=(_source(torque, speed, hours),),
         distribution=duration,
         points=LoadPoints(
-            duration.torque, np.zeros((1, HUB_LOADS)), duration.hours, duration.revolutions, np.zeros(1, int)
+            duration.torque,
+            np.zeros((1, HUB_LOADS)),
+            duration.hours,
+            duration.revolutions,
+            duration.running_speed,
+            np.zeros(1, int),
         ),
         equivalent_ranges={},
         teeth=teeth,
