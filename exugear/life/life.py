@@ -364,17 +364,14 @@ def _assumptions(
     if counted.points.other.any():
         hub = f"rotor forces and moments on {counted.body} in {len(counted.points.torque)} points; their effect is "
         hub += "linear at each torque"
+    aligned = ", ".join(name for name, stress in stresses.items() if len(stress.misalignment) < 2)
     lines = [
         hub,
         f"static balance at {count} torque{'s' * (count > 1)} and {turns} carrier angle{'s' * (turns > 1)}, "
         + ("proportional to torque" if balance.linear else "forces interpolated linearly over torque"),
         _dynamic_in_words(rating, dynamic, acting) + "; none on bearings",
         "face and transverse load factors are included in the finite element contact stresses"
-        + (
-            ""
-            if any(len(stress.misalignment) > 1 for stress in stresses.values())
-            else ", for aligned gears; tables with axes (--grid) include misalignment"
-        ),
+        + (f", of {aligned} for aligned gears; --mesh-model table includes misalignment" if aligned else ""),
         f"required: S_H {rating.minimum_S_H:g}, S_F {rating.minimum_S_F:g}, S_0 {rating.minimum_S_0:g}",
         "S_H and S_F to ISO 6336: nominal stresses with K_Hbeta of the finite elements and K_Halpha = K_Falpha = 1",
         "Z_W = Z_X = 1; S-N curves are extrapolated beyond their last point (no endurance limit)",

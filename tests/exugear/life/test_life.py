@@ -529,6 +529,14 @@ def test_planet_bearings_carry_the_couple_of_their_helix(grc, balance):
 
 
 @pytest.mark.validation
+def test_stresses_of_aligned_gears_are_told_with_the_mesh_model_that_includes_misalignment(first):
+    said = "of spur for aligned gears; --mesh-model table includes misalignment"
+    assert said in read_life(first.life_path).attrs["assumptions"]
+    tabled = first.chosen(mesh_model="table").life()
+    assert "aligned gears" not in tabled.attrs["assumptions"]
+
+
+@pytest.mark.validation
 def test_the_verb_tells_what_limits_and_what_that_rests_on(tmp_path, first):
     case = tmp_path / "gearbox.toml"
     (tmp_path / "loads.csv").write_text(TABLE)
