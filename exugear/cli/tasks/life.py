@@ -16,6 +16,10 @@ from fe_ste.tools.display import life_text
 
 LEAST_DAMAGE = 1e-3
 """Smaller damages are printed as such."""
+NOTHING_RATED = (
+    "no part is rated: a gear requires [rating.gears.NAME] and a pair with a table, a bearing a table [.catalogue] and "
+    "a variant with bearings"
+)
 _column = partial(Column, missing="")
 CONTACT_LEGEND = (
     "σ_H life: largest over loads and mesh cycle within the path of contact, misaligned by each load, with K_v "
@@ -46,13 +50,17 @@ def life(project: WatchedProject, as_json: bool, whole: bool) -> None:
     failures = [*found["failures"], *found["shortfalls"]]
     years, hours = float(data.attrs["life_years"]), float(data["hours"].sum())
     parts = _parts(found)
-    worst = f": damage {PARTS[2].cell(parts[0])}, {parts[0]['part']}, {parts[0]['mode']}" if parts else ""
+    outcome = "unknown: no part is rated"
+    if parts:
+        outcome = "not reached" if failures else "reached"
+        outcome += f": damage {PARTS[2].cell(parts[0])}, {parts[0]['part']}, {parts[0]['mode']}"
     Outcome(
-        verdict=f"Life of {years:g} years, {hours:,.0f} h, {'not reached' if failures else 'reached'}{worst}",
+        verdict=f"Life of {years:g} year{'s' * (years != 1.0)}, {hours:,.0f} h, {outcome}",
         summary=found,
         tables=life_tables(found),
         findings=[
             *bearing_findings(found["remarks"]),
+            *([] if parts else [Finding("warning", NOTHING_RATED)]),
             *(Finding("warning", line) for line in found["reliefs"]),
             *(Finding("note", line) for key in ("assumptions", "unrated") for line in found[key]),
         ],

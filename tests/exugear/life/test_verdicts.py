@@ -33,7 +33,9 @@ from exugear.system.bearings.rolling.life import (
 )
 from fe_ste.root_stress import MeshCycleStress
 
+from ..cases.case_mutations import toml_text
 from ..cases.command import exugear
+from ..cases.gear_trains import pair
 from ..cases.spur import SPUR_CASE
 from .test_life import OIL, TABLE, content_of, hub_assembly
 
@@ -323,3 +325,17 @@ def test_ra_counts_as_a_sixth_of_rz(tmp_path):
     section = {**content["rating"]["gears"]["pinion"]}
     section.pop("roughness_Rz_um")
     assert roughness_of(StrengthSection(**section, roughness_Ra_um=0.8)) == pytest.approx(4.8e-6)
+
+
+def test_a_life_in_which_no_part_is_rated_is_not_called_reached(tmp_path):
+    """Stated stiffness of teeth and bearings, and no strength of any gear."""
+    content = pair()
+    duty = {"torque_N_m": [100.0], "speed_rpm": [600.0], "hours": [1000.0]}
+    content["loads"] = {"body": "input", "life_years": 1.0, "sources": {"duty": duty}}
+    content["rating"] = {"dynamic_factor": 1.0, "viscosity_40_mm2_per_s": 220.0}
+    case = tmp_path / "gearbox.toml"
+    case.write_text(toml_text(content), encoding="utf-8")
+    result = exugear("life", case, "--out", tmp_path / "results")
+    assert result.exit_code == 0, result.output
+    assert "Life of 1 year, 1,000 h, unknown: no part is rated" in result.stdout
+    assert "Warning: no part is rated: a gear requires [rating.gears.NAME]" in result.stderr
