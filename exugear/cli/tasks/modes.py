@@ -105,10 +105,15 @@ COLUMNS = (
 def mode_table(summary: Mapping[str, Any], whole: bool) -> Table:
     """Return the table of modes by TE participation with the largest energies, or by frequency with all of them.
 
-    Damping and TE participation are omitted for rigid-body modes.
+    Damping and TE participation are omitted for rigid-body modes, which come last. Modes that participate by round-off
+    only are in the order of frequencies.
     """
+
+    def rank(mode: Mapping[str, Any]) -> tuple[bool, float]:
+        return mode["frequency_Hz"] == 0.0, -round(mode["te_participation"], 6)
+
     by = "frequency" if whole else "TE participation"
-    rows = summary["modes"] if whole else sorted(summary["modes"], key=lambda mode: -mode["te_participation"])
+    rows = summary["modes"] if whole else sorted(summary["modes"], key=rank)
     most = None if whole else 1
     columns = [
         *COLUMNS,

@@ -264,6 +264,16 @@ def test_modes(printed: Printed) -> None:
     printed.check(2)
 
 
+def test_modes_that_participate_by_round_off_are_in_the_order_of_frequencies() -> None:
+    shares = {1: (0.0, 1e-20), 2: (100.0, 1e-31), 3: (200.0, 1.0), 4: (300.0, 1e-17)}
+    rows = [
+        {"mode": mode, "frequency_Hz": frequency, "te_participation": share, "name": ""}
+        for mode, (frequency, share) in shares.items()
+    ]
+    summary = {"variant": "bushing", "mesh_model": "line_of_action", "inertias": "discs", "modes": rows}
+    assert [row["mode"] for row in modes.mode_table(summary, whole=False).rows] == [3, 2, 4, 1]
+
+
 def test_life(printed: Printed) -> None:
     flanks = [f"{NAMES[0]} + {name}" for name in NAMES]
     flank = dict.fromkeys(("outside", "face_load", "contact_safety", "root_safety"), 123.456)
