@@ -21,7 +21,14 @@ from exugear.life.dynamic_factors import WITHIN, DynamicFactor
 from exugear.life.gear_life import FlankLife, check_strengths, flank_lives, warn_beyond_tables
 from exugear.life.load_spectrum.counted import CountedLoads, count_loads
 from exugear.life.load_spectrum.sources import Progress, section_of
-from exugear.life.static_balance import ActingLoads, AngleStore, StaticBalance, acting_loads, static_balance
+from exugear.life.static_balance import (
+    ActingLoads,
+    AngleStore,
+    StaticBalance,
+    acting_loads,
+    static_balance,
+    torque_reaches,
+)
 from exugear.system.bearings.rolling.life import LEAST_RATIO
 from exugear.system.system import Assembly, input_hash
 from fe_ste.standards.iso6336 import outside_scope
@@ -45,6 +52,8 @@ NOT_RATED = (
     "tooth flank fracture (ISO/TS 6336-4): not rated by this program",
 )
 """Failure modes of gears that are not rated, with the reason."""
+SYMMETRIC = "reversed torque loads the opposite flanks; their teeth are assumed symmetric"
+"""Assumption for loads that press other flanks than the static load, for which tables are computed."""
 
 
 def check_reach(gearbox: Gearbox, counted: CountedLoads, tables: Mapping[str, float]) -> None:
@@ -221,7 +230,8 @@ def checked_loads(gearbox: Gearbox, progress: Progress | None = None) -> Counted
     """
     check_keys(gearbox)
     counted = count_loads(gearbox, progress)
-    check_strengths(gearbox, rating_of(gearbox), counted.teeth, bool(np.any(counted.distribution.torque < 0.0)))
+    senses = set(np.sign(counted.distribution.torque).tolist())
+    check_strengths(gearbox, rating_of(gearbox), counted.teeth, senses >= {-1.0, 1.0})
     return counted
 
 
@@ -321,6 +331,7 @@ def compute_life(
         reliefs=tuple(needs_of_relief(gearbox, flanks)),
         assumptions=(
             *_assumptions(rating, counted, acting, balance, stresses, dynamic, gearbox.case.lubricant),
+            *([SYMMETRIC] if any(back for _, back in torque_reaches(assembly, counted).values()) else []),
             *(f"K_gamma of {family} = {value:.3f}, included in the mesh forces" for family, value in told.items()),
             *warn_beyond_tables(gearbox, acting, balance, stresses),
             *reaches(flanks),
@@ -382,8 +393,6 @@ def _assumptions(
             f"outside their tables under some loads: {', '.join(balance.outside)}; extrapolated linearly; widen the "
             "axes of [ste]"
         )
-    if np.any(counted.distribution.torque < 0.0):
-        lines.append("reversed torque loads the opposite flanks; their teeth are assumed symmetric")
     return [*lines, *counted.remarks]
 
 

@@ -464,7 +464,7 @@ def stress_requests(
         for contact_place in contact_places(state.assembly, state.q).values():
             tilts.setdefault(contact_place.table.pair.name, []).append(contact_place.misalignment)
     tilts = tilts
-    reaches = _reaches(assembly, counted)
+    reaches = torque_reaches(assembly, counted)
     found = []
     for request in requests:
         wanted = request.wanted
@@ -477,7 +477,7 @@ def stress_requests(
     return found
 
 
-def _reaches(assembly: Assembly, counted: CountedLoads) -> dict[str, tuple[float, float]]:
+def torque_reaches(assembly: Assembly, counted: CountedLoads) -> dict[str, tuple[float, float]]:
     """Return by pair the largest torque (ratio at least 1) and largest reversed torque over the static torque."""
     gearbox = assembly.gearbox
     largest = max(float(abs(source.torque).max()) for source in counted.sources)

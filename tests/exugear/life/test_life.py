@@ -24,7 +24,7 @@ from exugear.gearbox.sections.loads import RatingSection
 from exugear.gearbox.variant import VariantError
 from exugear.life.dynamic_factors import stated_factors
 from exugear.life.gear_life import flank_lives, pair_stresses, warn_beyond_tables
-from exugear.life.life import checked_loads, compute_life, needs_of_relief, rating_of, shortfalls
+from exugear.life.life import SYMMETRIC, checked_loads, compute_life, needs_of_relief, rating_of, shortfalls
 from exugear.life.life_file import damage_matrix, draw_life, limits, read_life, summary
 from exugear.life.load_spectrum.counted import count_loads
 from exugear.life.rating.lacks import missing_for_life
@@ -41,6 +41,7 @@ from fe_ste.standards.tooth_root import root_stress_factors
 
 from ..cases.case_mutations import toml_text
 from ..cases.command import exugear
+from ..cases.gear_trains import two_stage
 from ..cases.spur import SPUR_CASE
 from ..cases.table import surfaces
 
@@ -339,6 +340,24 @@ def test_gears_that_bend_both_ways_need_their_factor(tmp_path):
     assert found["loads"] == ()
     for verb in ("life", "check --rating"):
         assert all(reason.startswith(key) for reason, key in zip(found[verb], missing, strict=True))
+
+
+def test_gears_that_bend_one_way_need_no_factor_whatever_the_sign_of_the_torque(tmp_path):
+    """A generator's torque is negative at its shaft; a bin of zero torque loads no flank."""
+    for table in ("-200,1000,3\n-100,1000,1\n", "-200,1000,3\n0,1000,1\n", "200,1000,3\n0,1000,1\n"):
+        counted = checked_loads(spur_project(tmp_path, f"torque_N_m,speed_rpm,hours\n{table}").gearbox)
+        assert counted.distribution.hours.sum() == pytest.approx(10_000.0)
+
+
+@pytest.mark.parametrize(("load", "sign", "told"), [(20.0, 1.0, False), (-20.0, -1.0, False), (-20.0, 1.0, True)])
+def test_a_reversed_torque_is_one_against_the_static_load(tmp_path, load, sign, told):
+    content = two_stage()
+    content["static_load"]["torques_N_m"] = {"input": sign * 100.0}
+    duty = {"torque_N_m": [load], "speed_rpm": [600.0], "hours": [1000.0]}
+    content["loads"] = {"body": "input", "life_years": 1.0, "sources": {"duty": duty}}
+    content["rating"] = {"dynamic_factor": 1.0, "viscosity_40_mm2_per_s": 220.0}
+    data = Project(Gearbox.from_dict(content), tmp_path, Choice("bushing")).life()
+    assert (SYMMETRIC in json.loads(data.attrs["assumptions"])) == told
 
 
 def test_check_says_for_each_verb_of_a_life_whether_it_is_possible_and_all_that_is_missing(tmp_path):
