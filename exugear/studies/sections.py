@@ -383,7 +383,6 @@ _REMEDIES = {
     "dict_type": "must be a table",
     "model_type": "must be a table",
     "list_type": "must be an array in brackets",
-    "too_short": "must have at least 1 entry",
 }
 
 
@@ -402,6 +401,9 @@ def _described(error: Any) -> str:
         known = list(getattr(section, "model_fields", {}))
         return f"{key}: unknown key; " + suggestion(location[-1], known, f"known keys are {', '.join(known)}")
     remedy = _REMEDIES.get(error["type"])
+    if error["type"] == "too_short":
+        least = error["ctx"]["min_length"]
+        remedy = f"must have at least {least} {'entry' if least == 1 else 'entries'}"
     if error["type"] == "literal_error":
         remedy = one_of(error["ctx"]["expected"], error["input"])
     if remedy is None:

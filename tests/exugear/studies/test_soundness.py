@@ -46,6 +46,11 @@ def nearest(**options):
             "parameters.a: sets housing.factor twice; remove one",
         ),
         (
+            {"parameters": {"a": {"paths": ["housing.factor"], "values": [0.2, 0.4]}}},
+            "parameters.a.paths = ['housing.factor']: must have at least 2 entries",
+        ),
+        ({"parameters": {"a": SEAT | {"values": []}}}, "parameters.a.values = []: must have at least 1 entry"),
+        (
             {"parameters": {"a": SEAT | {"values": [0.3, 0.5, 0.3]}}},
             "parameters.a: values 1 and 3 are the same point, housing.factor = 0.3",
         ),
