@@ -43,6 +43,20 @@ class Finding:
         return f"{self.level.capitalize()}: {self.text}"
 
 
+def percent_text(share: float, digits: int = 3) -> str:
+    """Return a share in per cent with some significant digits, and without an exponent if it is large.
+
+    Examples
+    --------
+    >>> percent_text(2e-5, 1), percent_text(0.2, 1), percent_text(195.0), percent_text(math.inf)
+    ('0.002 %', '20 %', 'over 1000 %', 'over 1000 %')
+    """
+    text = f"{100.0 * share:.{digits}g}"
+    if not float(text) <= 1000.0:
+        return "over 1000 %"
+    return f"{float(text):.0f} %" if "e+" in text else f"{text} %"
+
+
 def check_finding(passed: bool, text: str, value: float | None = None) -> Finding:
     """Return the finding of a check: passed, or a warning."""
     return Finding("passed" if passed else "warning", text, value)
@@ -68,7 +82,7 @@ def run_findings(attributes: Mapping[str, Any], residual: float, times: Mapping[
     """
     found = []
     if not math.isnan(residual):
-        text = f"energy balance closed to {100.0 * abs(residual):.1g} %"
+        text = f"energy balance closed to {percent_text(abs(residual), 1)}"
         found.append(check_finding(abs(residual) < MAX_ENERGY_RESIDUAL, text, residual))
     if reason := invalidity_of(attributes):
         found.append(Finding("error", f"the run is invalid: {reason}"))

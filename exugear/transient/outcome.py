@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from exugear.gearbox.load_cases import BURSTING_RIM_SPEED, LoadSummary, rim_radii
+from exugear.results.findings import percent_text
 from exugear.results.folder import read_stored_gearbox
 from exugear.results.spectra.diagrams import draw_levels, draw_waterfall
 from exugear.results.spectra.waterfall import order_lines
@@ -340,8 +341,8 @@ class ValidityMonitor:
         if largest > self.limits.energy_marked:
             yield (
                 f"energy: from t = {since:.4g} s on the energy balance error exceeds "
-                f"{_percent(self.limits.energy_marked)} of the largest energy in the run, maximum {_percent(largest)}"
-                "; the motion is unstable, or the time step is too large"
+                f"{percent_text(self.limits.energy_marked)} of the largest energy in the run, maximum "
+                f"{percent_text(largest)}; the motion is unstable, or the time step is too large"
             )
 
     def _speed_words(self) -> Iterator[str]:
@@ -375,7 +376,7 @@ class ValidityMonitor:
             mesh = self._meshes[int(number)]
             yield (
                 f"tooth deflection at t = {since:.4g} s: mesh {mesh}, tooth height {1e3 * height:.3g} mm, exceeds "
-                f"{_percent(limit)} of its tooth height, beyond breakage; maximum {_percent(largest)}"
+                f"{percent_text(limit)} of its tooth height, beyond breakage; maximum {percent_text(largest)}"
             )
 
     def _tensile_warning(self, share: Floats) -> Iterator[str]:
@@ -385,8 +386,8 @@ class ValidityMonitor:
             all_along = share.max() > WHOLLY
             cause = "check torque signs" if all_along else "the mesh is lightly loaded, or the motion is unstable"
             yield (
-                f"tensile mesh force: {', '.join(names)} for up to {_percent(share.max())} of the run (limit "
-                f"{_percent(limit)}); model {self._law} neglects contact loss; {cause}, or use --mesh-model table"
+                f"tensile mesh force: {', '.join(names)} for up to {percent_text(share.max())} of the run (limit "
+                f"{percent_text(limit)}); model {self._law} neglects contact loss; {cause}, or use --mesh-model table"
             )
 
     def _not_converged_warning(self, times: Floats) -> Iterator[str]:
@@ -396,7 +397,3 @@ class ValidityMonitor:
                 f"table: {', '.join(names)} read table states next to non-converged ones (interpolated) for up to "
                 f"{times.max():.3g} s; exugear ste lists the states and reasons"
             )
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.3g} %"

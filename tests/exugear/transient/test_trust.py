@@ -106,6 +106,15 @@ def test_teeth_that_pull_for_the_whole_run_end_with_code_1_and_a_red_box_in_the_
     assert "NO, see top of page" in page and '<section id="ranking"' in page  # shown all the same
 
 
+def test_absurd_shares_are_told_without_exponents(tmp_path):
+    """A torque in N mm: teeth that deflect by many times their height."""
+    outcome = exugear("run", written(tmp_path, "{ shaft_1 = 100e6, shaft_2 = 150e6 }"))
+    assert outcome.exit_code == 1
+    message = " ".join(outcome.stderr.split())
+    assert "beyond breakage; maximum over 1000 %" in message
+    assert not re.search(r"(e\+\d+|inf|nan) %", message)
+
+
 def test_a_good_run_is_trusted(tmp_path):
     outcome = exugear("run", written(tmp_path, BALANCED), "--json")
     assert outcome.exit_code == 0, outcome.stderr
