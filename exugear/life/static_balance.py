@@ -463,7 +463,6 @@ def stress_requests(
         state = static_state(assembly)
         for contact_place in contact_places(state.assembly, state.q).values():
             tilts.setdefault(contact_place.table.pair.name, []).append(contact_place.misalignment)
-    tilts = tilts
     reaches = torque_reaches(assembly, counted)
     found = []
     for request in requests:
