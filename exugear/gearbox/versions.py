@@ -18,6 +18,6 @@ LIFE = 12
 #: Steady-state responses (`exugear.steady`, and all methods that modes use).
 STEADY = 33
 #: Comparisons with measured run-ups (`exugear.steady.evaluation`, `exugear.results.order_tracking`).
-MEASURED = 4
+MEASURED = 5
 #: Points of studies (`exugear.studies`: their outputs; the methods that these use have their own versions).
 STUDY = 4

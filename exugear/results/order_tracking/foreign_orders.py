@@ -20,8 +20,8 @@ from exugear.results.order_tracking.shaft_angle import ShaftAngle
 from exugear.results.spectra.waterfall import amplitude_spectrum, overlapping_frames
 from fe_ste.tools.arrays import Floats
 
-REVOLUTIONS = 32
-"""Revolutions of a window."""
+REVOLUTIONS = 32, 16, 8
+"""Revolutions of a window: the first that a run is long enough for."""
 ABOVE = 6.0
 """Level above the neighbourhood from which an order stands out, dB."""
 BELOW_HIGHEST = 40.0
@@ -30,6 +30,8 @@ NEIGHBOURHOOD = 41
 """Number of spectral lines of the neighbourhood."""
 FEWEST_WINDOWS = 12
 """Number of windows below which the median does not suppress noise."""
+FEWEST_REVOLUTIONS = REVOLUTIONS[-1] * (FEWEST_WINDOWS + 1) // 2
+"""Revolutions of the faster half of a run that so many windows take, each half over the one before."""
 FAST_PART = 0.5
 """Fraction of the highest speed above which windows count; a revolution at lower speeds has many more samples."""
 WINDOWS_AT_ONCE = 16
@@ -127,7 +129,7 @@ def gearbox_orders(gearbox: Gearbox, highest: float) -> tuple[GearboxOrder, ...]
 
 
 def order_spectrum(values: Floats, shaft: ShaftAngle, per: float = 1.0) -> OrderSpectrum | None:
-    """Median spectrum over the angle, throughout the faster half of a run; None if it has fewer than twelve windows.
+    """Median spectrum over the angle, throughout the faster half of a run; None if it is too short for twelve windows.
 
     Parameters
     ----------
@@ -141,18 +143,19 @@ def order_spectrum(values: Floats, shaft: ShaftAngle, per: float = 1.0) -> Order
     # As many samples of a revolution as the recording has at half of the highest speed: no order is aliased.
     count = 2 ** int(np.ceil(np.log2(shaft.rate / (FAST_PART * speed.max()))))
     even = np.arange(np.ceil(turns[fast[0]] * count), np.floor(turns[fast[-1]] * count)) / count
-    length = REVOLUTIONS * count
-    if even.size < length * (FEWEST_WINDOWS + 1) // 2:
+    most = 2 * even.size // ((FEWEST_WINDOWS + 1) * count)
+    revolutions = next((own for own in REVOLUTIONS if own <= most), None)
+    if revolutions is None:
         return None
     # In single precision, which takes half the time and is 100 dB below the range of orders that are reported.
-    frames = overlapping_frames(np.interp(even, turns, values).astype(np.float32), length, 0.5)
+    frames = overlapping_frames(np.interp(even, turns, values).astype(np.float32), revolutions * count, 0.5)
     # The images of high frequencies that linear interpolation leaves are above this order.
-    top = int(0.4 * shaft.rate / speed.max() * REVOLUTIONS)
+    top = int(0.4 * shaft.rate / speed.max() * revolutions)
     spectra = [
         amplitude_spectrum(part - part.mean(axis=1, keepdims=True), count)[1][:, :top]
         for part in np.array_split(frames, -(-len(frames) // WINDOWS_AT_ONCE))
     ]
-    resolution = abs(per) / REVOLUTIONS
+    resolution = abs(per) / revolutions
     typical = np.asarray(np.median(np.concatenate(spectra), axis=0), dtype=np.float64)
     return OrderSpectrum(np.linspace(0.0, resolution * (top - 1), top), typical, resolution)
 
@@ -182,7 +185,7 @@ def standing_orders(spectrum: OrderSpectrum) -> tuple[OrderInSpectrum, ...]:
 
 
 def foreign_orders(
-    standing: Iterable[OrderInSpectrum], known: Sequence[GearboxOrder], resolution: float = 1.0 / REVOLUTIONS
+    standing: Iterable[OrderInSpectrum], known: Sequence[GearboxOrder], resolution: float = 1.0 / REVOLUTIONS[0]
 ) -> tuple[OrderInSpectrum, ...]:
     """Orders that belong to no shaft, mesh or sideband of the gearbox, highest first, down to 40 dB below the highest.
 

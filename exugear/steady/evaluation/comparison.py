@@ -404,27 +404,29 @@ def paired_peaks(cuts: ComparedCuts, stretch: float) -> tuple[PeakPair, ...]:
 def resonance_shift(peaks: Sequence[PeakPair], stretch: float) -> float:
     """Return computed over measured speed of resonances minus 1: the median of three or more pairs, or of the stretch.
 
-    Pairs at speeds where teeth lose contact do not count.
+    Pairs at speeds where teeth lose contact do not count. Without any pair it is NaN.
 
     Examples
     --------
     >>> peaks = [PeakPair(0, 0, 100.0, speed, 1.0, 1.0) for speed in (104.0, 105.0, 109.0)]
-    >>> round(resonance_shift(peaks, 1.0), 6), resonance_shift(peaks[:2], 0.8)
-    (0.05, 0.25)
+    >>> round(resonance_shift(peaks, 1.0), 6), resonance_shift(peaks[:2], 0.8), resonance_shift([], 0.8)
+    (0.05, 0.25, nan)
     """
+    if not any(peak.paired for peak in peaks):
+        return math.nan
     shifts = [peak.speed_difference for peak in peaks if peak.paired and not peak.contact_loss]
     return float(np.median(shifts)) if len(shifts) >= 3 else 1.0 / stretch - 1.0
 
 
 def _peaks(speed: Floats, amplitude: Floats, least: Floats) -> list[_Peak]:
-    """Peaks of an amplitude above a least one."""
+    """Peaks of an amplitude above a least one; unknown amplitudes are 0, and there is no peak next to them."""
     from scipy.signal import find_peaks
 
     level = 20.0 * np.log10(np.maximum(amplitude, 1e-300))
     frames, properties = find_peaks(level, prominence=FAINT)
     found = []
     for frame, prominence in zip(frames, properties["prominences"], strict=True):
-        if not amplitude[frame] > least[frame]:
+        if not (amplitude[frame] > least[frame] and amplitude[frame - 1 : frame + 2].all()):
             continue
         before, middle, after = level[frame - 1 : frame + 2]
         shift = 0.5 * (before - after) / (before - 2.0 * middle + after)

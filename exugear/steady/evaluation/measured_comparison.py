@@ -162,7 +162,7 @@ class MeasuredComparison(ReprMixin):
             "deviation_dB": _known(cuts.deviation()),
             "deviation_without_means_dB": _known(cuts.deviation_of_shapes),
             "speed_stretch": self.stretch,
-            "speed_shift_percent": 100.0 * self.speed_shift,
+            "speed_shift_percent": _known(100.0 * self.speed_shift),
             "channels": [
                 {
                     "channel": channel.name,

@@ -18,6 +18,7 @@ from exugear.gearbox.units import RPM, STANDARD_GRAVITY
 from exugear.results.findings import Finding
 from exugear.results.order_tracking.angle_cuts import USABLE_BAND
 from exugear.results.order_tracking.foreign_orders import (
+    FEWEST_REVOLUTIONS,
     OrderInSpectrum,
     OrderSpectrum,
     foreign_orders,
@@ -82,6 +83,7 @@ def noticed_mistakes(
         foreign = foreign_orders(standing_orders(spectrum), of_gearbox, spectrum.resolution)
     return foreign, (
         *speed_finding(gearbox, run_up, spectrum),
+        *length_finding(spectrum),
         *recording_findings(run_up),
         *load_finding(run_up, method),
         *band_findings(cuts),
@@ -92,6 +94,16 @@ def noticed_mistakes(
         *shift_finding(shift),
         *jump_finding(cuts, peaks),
     )
+
+
+def length_finding(spectrum: OrderSpectrum | None) -> Iterator[Finding]:
+    """Yield what is not looked for because the run-up has no spectrum over the angle."""
+    if spectrum is None:
+        yield Finding(
+            "note",
+            f"the faster half of the run-up has fewer than {FEWEST_REVOLUTIONS} revolutions: a wrong speed or shaft, "
+            "wrong numbers of teeth and other machines are not noticed; record a slower run-up",
+        )
 
 
 def recording_findings(run_up: MeasuredRunUp) -> Iterator[Finding]:
@@ -218,19 +230,20 @@ def level_findings(cuts: ComparedCuts) -> Iterator[Finding]:
             )
             continue
         offset = cuts.offset(number)
+        apart = f"{abs(offset):.1f} dB {'above' if offset > 0.0 else 'below'} the measured ones"
         spread = float(np.median(np.abs(cuts.difference[number][compared] - offset)))
         if channel.quantity == "acceleration" and abs(abs(offset) - GRAVITY_LEVEL) < LEVEL_ERROR:
             written, meant = ("m/s2", "g") if offset > 0.0 else ("g", "m/s2")
             yield Finding(
                 "warning",
-                f"channel {channel.name}: computed levels are {offset:+.1f} dB above the measured ones, like values in "
+                f"channel {channel.name}: computed levels are {apart}, like values in "
                 f'{meant} taken for {written}; check {key}.unit, probably "{meant}"',
                 offset,
             )
         elif abs(offset) > LEVEL_ERROR:
             yield Finding(
                 "warning",
-                f"channel {channel.name}: computed levels are {offset:+.1f} dB above the measured ones; check unit, "
+                f"channel {channel.name}: computed levels are {apart}; check unit, "
                 f"quantity, place and full scale of {key}",
                 offset,
             )
@@ -238,7 +251,7 @@ def level_findings(cuts: ComparedCuts) -> Iterator[Finding]:
             taken, meant = ("peak", "rms") if offset > 0.0 else ("rms", "peak")
             yield Finding(
                 "note",
-                f"channel {channel.name}: computed levels are {offset:+.1f} dB above the measured ones at all orders "
+                f"channel {channel.name}: computed levels are {apart} at all orders "
                 f"and speeds, a factor near the square root of 2, as if {meant} values were taken for {taken} values; "
                 f"damping and stiffness may have the same effect: check the calibration of {key}",
                 offset,

@@ -137,6 +137,44 @@ def test_a_mistake_of_the_measurement_is_named(bench: Bench, tmp_path: Path, mis
     assert re.search(words, warnings(found)), warnings(found)
 
 
+@pytest.mark.parametrize(("seconds", "noticed"), [(6.0, True), (4.0, False)])
+def test_a_wrong_speed_is_named_in_a_short_run_up_or_said_not_to_be_looked_for(
+    bench: Bench, tmp_path: Path, seconds: float, noticed: bool
+) -> None:
+    """The faster half has 120 and 80 revolutions, of which a tacho said to give two pulses each counts half."""
+    _, speed, angle = synthetic.run_up(seconds, drift=0.0)
+    signals = synthetic.signals(bench.response, speed, angle, noise=0.05)
+    tacho = {**synthetic.TACHO, "pulses_per_revolution": 2}
+    found = replace(bench, signals=signals, angle=angle, speed=speed).compared(
+        tmp_path, tacho=tacho, window_revolutions=4.0
+    )
+    assert ("tacho is probably pulses_per_revolution = 1" in warnings(found)) == noticed
+    notes = [own.text for own in found.findings if own.level == "note"]
+    assert any("fewer than 52 revolutions" in own for own in notes) != noticed
+
+
+def test_a_level_far_off_is_said_to_be_above_or_below(bench: Bench, tmp_path: Path) -> None:
+    signals = {**bench.signals, "left": 1e3 * bench.signals["left"], "te": 1e-3 * bench.signals["te"]}
+    said = warnings(bench.compared(tmp_path, signals))
+    assert re.search(r"channel left: computed levels are (59.9|60.\d) dB below the measured ones", said)
+    assert re.search(r"channel te: computed levels are (59.9|60.\d) dB above the measured ones", said)
+
+
+def test_an_order_that_leaves_the_usable_band_has_no_peak_where_it_ends(bench: Bench, tmp_path: Path) -> None:
+    """Every ninth sample: stage 1 reaches 0.45 of that rate, and levels beside speeds without a level are its last."""
+    rate = synthetic.RATE / 9
+    synthetic.recorded(tmp_path / "bench.h5", {n: own[::9] for n, own in bench.signals.items()}, bench.angle[::9])
+    with h5py.File(tmp_path / "bench.h5", "r+") as file:
+        file.attrs["sample_rate"] = rate
+    gearbox = Gearbox.from_toml(synthetic.gearbox_file(tmp_path, synthetic.measurement()))
+    found = compare_run_up(gearbox, read_run_up(gearbox), bench.response)
+    ends = [line for line, own in enumerate(np.isnan(found.cuts.measured[0])) if own.any()]
+    assert len(ends) >= 2
+    highest = np.nan_to_num(np.abs(found.cuts.measured)).max(axis=2)
+    for peak in found.peaks:
+        assert peak.measured < 1.2 * highest[peak.channel, peak.line]
+
+
 @pytest.mark.parametrize(
     ("factor", "words"),
     [(0.5**0.5, "rms values were taken for peak"), (2.0**0.5, "peak values were taken for rms"), (1.2, "")],
