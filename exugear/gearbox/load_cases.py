@@ -385,6 +385,25 @@ def table_speed_warning(gearbox: Gearbox, loads: LoadSummary) -> str:
     return f"load_cases.{loads.name}: {beyond}" if beyond else ""
 
 
+def drive_warning(gearbox: Gearbox, case: LoadCase, duration: float | None) -> str:
+    """Return a warning that a drive goes on beyond its end speed in a longer run; empty if it does not.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> drive_warning(gearbox, gearbox.load_cases["speed_driven"], 10.0)
+    'hss is driven on at the same rate after 5 s: to 3600 rpm at 10 s, beyond end_speed_rpm = 1800; ...
+    """
+    if duration is None or duration <= case.duration or case.end_speed is None or not drive_rate(gearbox, case):
+        return ""
+    reached = driven_start_speed(gearbox, case) + drive_rate(gearbox, case) * duration
+    return (
+        f"{case.driven_body} is driven on at the same rate after {case.duration:g} s: to {reached / RPM:.5g} rpm at "
+        f"{duration:g} s, beyond end_speed_rpm = {case.end_speed / RPM:g}; for a slower run-up set duration_s of the "
+        "load case instead of --duration"
+    )
+
+
 def load_case_warnings(
     gearbox: Gearbox,
     case: LoadCase,
@@ -418,6 +437,7 @@ def load_case_warnings(
         band_warning(loads, band),
         friction_warning(gearbox, loads),
         table_speed_warning(gearbox, loads),
+        drive_warning(gearbox, case, duration),
     )
     return tuple(filter(None, found))
 

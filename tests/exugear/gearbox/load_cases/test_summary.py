@@ -238,3 +238,28 @@ def test_a_load_case_becomes_the_static_load_with_what_holds_it():
         GearboxFileError, match=".torques_N_m: at the start, no torque acts except on bodies that hold the static load"
     ):
         gearbox_at_load(gearbox, spur(torques_N_m={"shaft_2": 60.0}).load_cases["run_up"])
+
+
+@pytest.mark.parametrize(("duration", "reached"), [("0.1", 150.0), ("0.2", 300.0)])
+def test_a_drive_that_goes_beyond_its_end_speed_says_which_speed_it_reaches(tmp_path, duration, reached):
+    """The run ends at that speed; of a run as long as the load case nothing is said."""
+    case = tmp_path / "spur.toml"
+    drive = 'driven_body = "shaft_1"\nend_speed_rpm = 150.0\ndrive_stiffness_N_m_per_rad = 1e5\nduration_s = 0.1\n'
+    loads = "torques_N_m = { shaft_2 = 10.0 }\nstart_speed_rpm = 0.0\n"
+    case.write_text(f"{SPUR_CASE.partition('[load_cases')[0]}\n[load_cases.ramp]\n{loads}{drive}", encoding="utf-8")
+    options = [
+        "--variant",
+        "rigid",
+        "--mesh-model",
+        "iso6336",
+        "--duration",
+        duration,
+        "--out",
+        tmp_path / "out",
+        "--json",
+    ]
+    outcome = exugear("run", case, *options)
+    assert outcome.exit_code == 0, outcome.stderr
+    assert json.loads(outcome.stdout)["input_speed_rpm"] == pytest.approx(reached, rel=0.02)
+    said = f"to {reached:g} rpm at {duration} s, beyond end_speed_rpm = 150" in outcome.stderr
+    assert said == (reached > 150.0)
