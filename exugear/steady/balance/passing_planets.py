@@ -43,23 +43,16 @@ BEARINGS_TOLERANCE = 1e-11
 """Residual of the motion of bearings over what it would be without their differences."""
 
 
-class SolvedGroups(NamedTuple):
-    """Groups of lines that passing planets couple, and the solution of their equation; g groups of n lines each."""
+class SolvedGroup(NamedTuple):
+    """Equation of a group of lines that passing planets couple, solved for their n readings that vary."""
 
-    lines: Integers
-    """(g, n)"""
-    mirrored: Booleans
-    """(g, n) whether a line is taken in as its conjugate."""
-    factors: list[tuple[Complexes, Integers]]
-    """g of the equation of the n s readings that vary, in a band, as LAPACK's zgbtrf gives them."""
+    lines: slice
+    """Among the lines of all groups."""
+    factors: Complexes
+    pivots: Integers
+    """Of the equation in a band, as LAPACK's zgbtrf gives them."""
     width: int
     """Of the band on either side of the diagonal."""
-    coupled: tuple[Integers, Integers, Integers]
-    """(p,) group, line, and line that it takes in, of each pair that is coupled."""
-    blocks: Complexes
-    """(p, s, s) forces of the first one along the readings of the other."""
-    answers: Complexes
-    """(g, n, k, s) all readings under a unit of each of these forces."""
 
 
 class VaryingPart(NamedTuple):
@@ -104,14 +97,22 @@ class PassingPlanets:
             _, forces, readings = part.stiffness.shape
             at = np.s_[row : row + forces], np.s_[column : column + readings]
             beyond = self._turns - len(part.stiffness) // 2
-            turns = slice(beyond, beyond + len(part.stiffness))
-            stiffness[turns, *at] = part.stiffness
-            of_damper[turns, *at] = part.damping
+            inside = slice(beyond, beyond + len(part.stiffness))
+            stiffness[inside, *at] = part.stiffness
+            of_damper[inside, *at] = part.damping
             row, column = row + forces, column + readings
         of_damper[self._turns] = 0.0
         self._of_damper = of_damper
         self._stiffness = stiffness
-        self._solved_groups = tuple(self._groups(stiffness, answers))
+        group, member, places, mirrored = self._members()
+        self._places, self._mirrored = places, mirrored[:, None]
+        self._to, self._of, turns = self._pairs(group, member)
+        speed = self._frequencies[-1] / self._lines.orders[-1]
+        frequencies = speed * (self._rows[group, member] @ self._lines.bases)  # negative of what is mirrored
+        rates = 1j * frequencies[:, None, None] * np.eye(len(self._at)) + self._carried
+        self._blocks = stiffness[turns] + of_damper[turns] @ rates[self._of]
+        self._answers = np.where(mirrored[:, None, None], answers[places].conj(), answers[places])
+        self._groups = list(self._solved(group))
 
     @cached_property
     def _coupling(self) -> HarmonicCoupling:
@@ -130,27 +131,39 @@ class PassingPlanets:
         """Return the forces (n, k) along readings (n, k) that all vary."""
         return self._coupling.of([self._stiffness], readings) + self.damper_forces(readings)
 
-    def _groups(self, stiffness: Complexes, answers: Complexes) -> Iterator[SolvedGroups]:
-        """Solve the groups of lines with their neighbours, in which the mesh cycle does not vary, by their size.
+    def _members(self) -> tuple[Integers, Integers, Integers, Booleans]:
+        """Find groups of lines with their neighbours at multiples of planet passages, without those of one line.
 
-        `stiffness` (2 turns + 1, s, s) couples readings at multiples of the carrier's angle.
+        Returns
+        -------
+        group, member : (l,) number of the group, and of the passages in it, group by group
+        lines, mirrored : (l,) and whether a line is taken in as its conjugate
         """
-        index = self._lines.index
-        step = self._step
-        passing = np.zeros(index.shape[1], dtype=np.int64)
-        passing[self._carrier] = step
-        first = self._first_of_groups()
-        reach = 2 * int(np.abs(index @ self._units).max()) // (step * int(self._units[self._carrier]))
-        rows = index[first, None, :] + np.arange(-reach, reach + 1)[:, None] * passing
+        rows = self._rows
         places, mirrored = self._lines.find(rows)
-        speed = self._frequencies[-1] / self._lines.orders[-1]
-        frequencies = speed * (rows @ self._lines.bases)
-        sizes = (places >= 0).sum(axis=1)
-        for size in np.unique(sizes[sizes > 1]):
-            group, member = (at.reshape(-1, size) for at in np.nonzero((places >= 0) & (sizes == size)[:, None]))
-            own = places[group, member], mirrored[group, member]
-            apart = step * (member[:, :, None] - member[:, None, :])
-            yield self._solved(stiffness, answers, own, frequencies[group, member], apart)
+        is_line = places >= 0
+        is_line &= is_line.sum(axis=1, keepdims=True) > 1
+        group, member = np.nonzero(is_line)
+        return group, member, places[group, member], mirrored[group, member]
+
+    @cached_property
+    def _rows(self) -> Integers:
+        """Multiples (groups, passages, bases) of all bases in the groups, most of which are no lines."""
+        index = self._lines.index
+        passing = np.zeros(index.shape[1], dtype=np.int64)
+        passing[self._carrier] = self._step
+        reach = 2 * int(np.abs(index @ self._units).max()) // (self._step * int(self._units[self._carrier]))
+        return index[self._first_of_groups(), None, :] + np.arange(-reach, reach + 1)[:, None] * passing
+
+    def _pairs(self, group: Integers, member: Integers) -> tuple[Integers, Integers, Integers]:
+        """Find the pairs (p,): line, line that it takes in, and the turns between them, counted from `-turns` on."""
+        reach = self._turns // self._step
+        places = np.full((len(self._rows), self._rows.shape[1] + 2 * reach), -1)
+        places[group, reach + member] = np.arange(len(group))
+        near = np.arange(2 * reach + 1)
+        taken = places[group[:, None], member[:, None] + near[::-1]]
+        to, apart = np.nonzero(taken >= 0)
+        return to, taken[to, apart], self._turns + self._step * (apart - reach)
 
     @property
     def _units(self) -> Integers:
@@ -171,54 +184,44 @@ class PassingPlanets:
         keys = np.column_stack([np.where(leading < 0, -1, 1)[:, None] * units, turns])
         return np.sort(np.unique(keys, axis=0, return_index=True)[1])
 
-    def _solved(
-        self,
-        stiffness: Complexes,
-        answers: Complexes,
-        lines: tuple[Integers, Booleans],
-        frequencies: Floats,
-        apart: Integers,
-    ) -> SolvedGroups:
-        """Solve groups of one size: lines (g, n), whether conjugates, frequencies (g, n), turns between (g, n, n)."""
-        places, mirrored = lines
-        groups, members = places.shape
-        count = stiffness.shape[-1]
-        group, to, of = np.nonzero(np.abs(apart) <= self._turns)
-        turns = apart[group, to, of] + self._turns
-        rates = 1j * frequencies[..., None, None] * np.eye(count) + self._carried
-        blocks = stiffness[turns] + self._of_damper[turns] @ rates[group, of]
-        answering = np.where(mirrored[..., None, None], answers[places].conj(), answers[places])
+    def _solved(self, group: Integers) -> Iterator[SolvedGroup]:
+        """Solve the groups of lines, in which the mesh cycle does not vary; their numbers (l,) ascend."""
+        count = len(self._at)
         # Products of arrays that are not in C order are slow.
-        own = np.ascontiguousarray(answering[:, :, self._at])
-        size = members * count
-        width = min(count * (1 + int(np.abs(to - of).max())), size) - 1
-        # Entry (i, j) of a matrix is at 2 width + i - j of column j of its band.
-        height = 3 * width + 1
-        bands = np.zeros((groups, height * size + size), dtype=complex)
-        bands[:, 2 * width : height * size : height] = 1.0
-        group_step, step = bands.strides
-        steps = group_step, count * step, step, count * (height - 1) * step, (height - 1) * step
-        matrix = as_strided(bands[:, 2 * width :], (groups, members, count, members, count), steps)
-        matrix[group, to, :, of] += own[group, to] @ blocks
-        in_columns = bands[:, : height * size].reshape(groups, size, height)
-        factors = [zgbtrf(band.T, width, width, overwrite_ab=True)[:2] for band in in_columns]
-        return SolvedGroups(places, mirrored, factors, width, (group, to, of), blocks, answering)
+        products = np.ascontiguousarray(self._answers[:, self._at])[self._to] @ self._blocks
+        begins = np.flatnonzero(np.diff(group, prepend=-1))
+        for begin, end in zip(begins, [*begins[1:], len(group)], strict=True):
+            pairs = slice(*np.searchsorted(self._to, [begin, end]))
+            to, of = self._to[pairs] - begin, self._of[pairs] - begin
+            size = count * int(end - begin)
+            width = min(count * (1 + int(np.abs(to - of).max())), size) - 1
+            # Entry (i, j) of the matrix is at 2 width + i - j of column j of its band.
+            height = 3 * width + 1
+            band = np.zeros(height * size + size, dtype=complex)
+            band[2 * width : height * size : height] = 1.0
+            (step,) = band.strides
+            steps = count * step, step, count * (height - 1) * step, (height - 1) * step
+            matrix = as_strided(band[2 * width :], (end - begin, count, end - begin, count), steps)
+            matrix[to, :, of] += products[pairs]
+            columns = band[: height * size].reshape(size, height).T
+            factors, pivots, _ = zgbtrf(columns, width, width, overwrite_ab=True)
+            yield SolvedGroup(slice(begin, end), factors, pivots, width)
 
     def solve(self, right: Complexes) -> Complexes:
         """Solve the equation (n, k) in which the mesh cycle does not vary."""
+        own = right[self._places]
+        given = np.where(self._mirrored, own.conj(), own)
+        found = given[:, self._at]
+        for group in self._groups:
+            varying = found[group.lines]
+            solution, _ = zgbtrs(group.factors, group.width, group.width, varying.ravel(), group.pivots)
+            varying[...] = solution.reshape(varying.shape)
+        pushed = (self._blocks @ found[self._of, :, None])[..., 0]
+        # Each line takes itself in, too.
+        forces = np.add.reduceat(pushed, np.flatnonzero(np.diff(self._to, prepend=-1)))
+        solved = given - (self._answers @ forces[..., None])[..., 0]
         out = right.copy()
-        for group in self._solved_groups:
-            given = np.where(group.mirrored[..., None], right[group.lines].conj(), right[group.lines])
-            varying = given[..., self._at].reshape(len(given), -1)
-            width = group.width
-            own = [zgbtrs(lu, width, width, b, p)[0] for (lu, p), b in zip(group.factors, varying, strict=True)]
-            found = np.array(own).reshape(*given.shape[:2], -1)
-            at, to, of = group.coupled
-            forces = np.zeros((*found.shape[:2], group.answers.shape[3]), dtype=complex)
-            np.add.at(forces, (at, to), (group.blocks @ found[at, of, :, None])[..., 0])
-            solved = given - (group.answers @ forces[..., None])[..., 0]
-            out[group.lines[group.mirrored]] = solved[group.mirrored].conj()
-            out[group.lines[~group.mirrored]] = solved[~group.mirrored]
+        out[self._places] = np.where(self._mirrored, solved.conj(), solved)
         return out
 
 

@@ -566,22 +566,42 @@ def take_out_two(k: int, i: int, cases: int, plan: Elimination, upper: Floats, r
 
 @kernel
 def substitute_back(k: int, cases: int, plan: Elimination, upper: Floats, out: Floats) -> None:
-    """Find the solution of step k from those of later ones."""
+    """Find the solution of step k from those of later ones, for three loads at a time."""
     diagonal = 2 * SIZE * plan.kept[k]
-    for case in range(cases):
-        to = 2 * SIZE * (k * cases + case)
-        p = eight(out, to)
-        q = eight(out, to + SIZE)
+    for first in range(0, cases, 3):
+        second = min(first + 1, cases - 1)
+        third = min(first + 2, cases - 1)
+        to = 2 * SIZE * k * cases
+        p0 = eight(out, to + 2 * SIZE * first)
+        q0 = eight(out, to + 2 * SIZE * first + SIZE)
+        p1 = eight(out, to + 2 * SIZE * second)
+        q1 = eight(out, to + 2 * SIZE * second + SIZE)
+        p2 = eight(out, to + 2 * SIZE * third)
+        q2 = eight(out, to + 2 * SIZE * third + SIZE)
         at = diagonal
         for entry in range(plan.diagonal[k] + 1, plan.first[k + 1]):
             at += 2 * SIZE
-            known = 2 * SIZE * (plan.column[entry] * cases + case)
             a = eight(upper, at)
             b = eight(upper, at + SIZE)
-            c = eight(out, known)
-            d = eight(out, known + SIZE)
-            p = p - a * c + b * d
-            q = q - a * d - b * c
-        p, q = times_entry(diagonal, p, q, upper)
-        put(out, to, p)
-        put(out, to + SIZE, q)
+            row = 2 * SIZE * plan.column[entry] * cases
+            c = eight(out, row + 2 * SIZE * first)
+            d = eight(out, row + 2 * SIZE * first + SIZE)
+            p0 = p0 - a * c + b * d
+            q0 = q0 - a * d - b * c
+            c = eight(out, row + 2 * SIZE * second)
+            d = eight(out, row + 2 * SIZE * second + SIZE)
+            p1 = p1 - a * c + b * d
+            q1 = q1 - a * d - b * c
+            c = eight(out, row + 2 * SIZE * third)
+            d = eight(out, row + 2 * SIZE * third + SIZE)
+            p2 = p2 - a * c + b * d
+            q2 = q2 - a * d - b * c
+        p0, q0 = times_entry(diagonal, p0, q0, upper)
+        p1, q1 = times_entry(diagonal, p1, q1, upper)
+        p2, q2 = times_entry(diagonal, p2, q2, upper)
+        put(out, to + 2 * SIZE * first, p0)
+        put(out, to + 2 * SIZE * first + SIZE, q0)
+        put(out, to + 2 * SIZE * second, p1)
+        put(out, to + 2 * SIZE * second + SIZE, q1)
+        put(out, to + 2 * SIZE * third, p2)
+        put(out, to + 2 * SIZE * third + SIZE, q2)

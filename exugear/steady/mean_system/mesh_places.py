@@ -25,6 +25,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -152,6 +153,11 @@ class MeshInterface:
     off the middle, for components of meshes only; in the last column the difference in the static state."""
     rates: Floats | None = None
     """(m, r, size) rows of what the law reads by the rates of the coordinates; non-linear bearings have some."""
+
+    @cached_property
+    def turned_by_places(self) -> dict[tuple[int, int, float], Complexes]:
+        """What the harmonics of mesh cycles are between waves, by first wave, harmonics and speed; `CycleFunctions`."""
+        return {}
 
 
 def mesh_ports(waves: MeshWaves, speed: float, loses_contact: bool) -> MeshInterface:
@@ -362,16 +368,24 @@ class CycleFunctions:
 
     def _by_places(self, family: Family, spectrum: Complexes, ports: MeshInterface, speed: float) -> Complexes:
         """Functions by all places, each as far ahead as in the static state, with multiples of the carrier's angle."""
-        samples = SAMPLED * family.turns if family.carrier >= 0 else 1
-        there, norms = _shapes_over_turn(family, speed, samples)
-        back = np.swapaxes(there / norms, -1, -2)
-        ahead = ports.positions[family.first] + np.array(family.ahead) + there @ ports.static[family.waves, POSITION]
-        turned = np.exp(2j * math.pi * np.arange(len(spectrum) // 2 + 1)[:, None, None] * ahead)
-        between = (back * turned[:, :, None, :]) @ there
-        factors = np.fft.fft(between, axis=1)[:, np.arange(-family.turns, family.turns + 1)] / samples
-        factors = np.concatenate([factors[:0:-1, ::-1].conj(), factors])
+        key = family.first, len(spectrum), speed
+        factors = ports.turned_by_places.get(key)
+        if factors is None:
+            factors = ports.turned_by_places[key] = _turned_by_places(family, len(spectrum) // 2, ports, speed)
         found = factors[:, :, :, None, :, None] * spectrum[:, None, None, :, None, :]
         return found.reshape(-1, family.count * self._forces, family.count * self._forces)
+
+
+def _turned_by_places(family: Family, harmonics: int, ports: MeshInterface, speed: float) -> Complexes:
+    """Find what a harmonic of a mesh cycle is between waves, (2 harmonics + 1, 2 turns + 1, count, count)."""
+    samples = SAMPLED * family.turns if family.carrier >= 0 else 1
+    there, norms = _shapes_over_turn(family, speed, samples)
+    back = np.swapaxes(there / norms, -1, -2)
+    ahead = ports.positions[family.first] + np.array(family.ahead) + there @ ports.static[family.waves, POSITION]
+    turned = np.exp(2j * math.pi * np.arange(harmonics + 1)[:, None, None] * ahead)
+    between = (back * turned[:, :, None, :]) @ there
+    factors = np.fft.fft(between, axis=1)[:, np.arange(-family.turns, family.turns + 1)] / samples
+    return np.concatenate([factors[:0:-1, ::-1].conj(), factors])
 
 
 def _spectrum(spectra: Spectra, first: int, forces: int) -> Complexes:
