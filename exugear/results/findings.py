@@ -12,8 +12,8 @@ from exugear.results.run_file import invalidity_of
 
 MAX_ENERGY_RESIDUAL = 1e-3
 """Permissible relative residual of the energy balance of a run."""
-DOUBTS = ("table_doubt", "band_doubt", "bearing_doubt")
-"""Attributes of a run with warnings about its load case."""
+DOUBTS = ("table_doubt", "band_doubt", "folding_doubt", "bearing_doubt")
+"""Attributes of a run with warnings about its load case and its step."""
 
 
 @dataclass(frozen=True)

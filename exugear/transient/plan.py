@@ -188,6 +188,8 @@ class RunPlan:
     """``compiled`` or ``exudyn``."""
     mesh_route: MeshRoute = "element"
     """How meshes act in Exudyn: ``element`` or ``loads``."""
+    folding_doubt: str = ""
+    """Warning about harmonics of the meshes that the step folds into the band; empty if none."""
 
     @property
     def step(self) -> float:
@@ -274,6 +276,7 @@ def plan_run(
     sample_rate: float,
     solver: str,
     mesh_route: MeshRoute = "element",
+    folding_doubt: str = "",
 ) -> RunPlan:
     """Plan a run of so many seconds.
 
@@ -294,4 +297,6 @@ def plan_run(
             f"use {1.0 / (steps_per_sample * step):g} Hz"
         )
     steps = round(total / step)
-    return RunPlan(assembly, case, directory, steps, steps_per_sample, band, integration, solver, mesh_route)
+    return RunPlan(
+        assembly, case, directory, steps, steps_per_sample, band, integration, solver, mesh_route, folding_doubt
+    )

@@ -28,6 +28,7 @@ from exugear.system.signals import signal_layout
 from exugear.system.tooth_mesh.element import Angles, MeshData, friction_lack
 from exugear.transient.compiled.integrator import INTEGRATORS, choose_integration, fastest_motion
 from exugear.transient.compiled.solver import CompiledSystem, unsupported_reason
+from exugear.transient.folding import choose_against_folding, folding_warning
 from exugear.transient.outcome import LimitError, Progress, ProgressMeter, Run, RunError
 from exugear.transient.plan import SAMPLE_RATE, RunPlan, check_disk, check_duration, plan_run, too_fine
 from exugear.transient.recorder import Recorder
@@ -193,7 +194,8 @@ def simulate(
     out : results directory
     bodies : by body name, reduced flexible bodies, required by the variant `flexible`
     duration : simulated time, s; the load case's by default, that of the stopped run where one is resumed
-    step : integration step, s; chosen from `band` and the fastest eigenfrequency by default
+    step
+        Integration step, s; by default chosen from `band`, the fastest eigenfrequency and the harmonics of the meshes.
     band, sample_rate : highest frequency whose amplitude is kept, and stored rate, Hz; the rate must divide the steps
     solver : {"compiled", "exudyn"}, optional
         The compiled one where it applies by default; a body in a floating frame needs Exudyn.
@@ -251,11 +253,16 @@ def simulate(
         raise RunError(f"the compiled solver cannot run this: {reason}; use --solver exudyn")
     chosen = "exudyn" if reason else solver or "compiled"
     kind = integrator if chosen == "compiled" else "rk4"  # Exudyn's explicit method is the same
-    integration = choose_integration(assembly, sample_rate, band, step=step, integrator=kind)
+    doubt = ""
+    if step is None:
+        integration, line = choose_against_folding(assembly, case, total, sample_rate, band, kind)
+        doubt = folding_warning(line, assembly, case, total, band, kind)
+    else:
+        integration = choose_integration(assembly, sample_rate, band, step=step, integrator=kind)
     if step is None and too_fine(integration.step, total, sample_rate):
         raise gearbox.error(f"{fastest_motion(assembly)}; {too_fine(integration.step, total, sample_rate)}")
     with held(directory):
-        plan = plan_run(assembly, case, directory, total, integration, band, sample_rate, chosen, mesh_route)
+        plan = plan_run(assembly, case, directory, total, integration, band, sample_rate, chosen, mesh_route, doubt)
         if not resume:
             size = signal_layout(assembly).sample_bytes
             check_disk(gearbox, case, directory, total, sample_rate, sample_bytes=size)

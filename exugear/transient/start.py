@@ -156,7 +156,7 @@ def prepare_start(plan: RunPlan, resume: bool) -> RunStart:
         load = load_in_words(case)
         beyond = band_warning(summary, plan.band)
         doubts = {"bearing_doubt": doubt, "table_doubt": other, "band_doubt": beyond}
-        told = {**doubts, "load": load, "duration": plan.duration}
+        told = {**doubts, "folding_doubt": plan.folding_doubt, "load": load, "duration": plan.duration}
         pieces = RunPieces(plan.partial_path, layout, {**plan.attributes(), **told})
     return RunStart(_load_table(case, series, state.start_angle, assembly), state, pieces, judge, resume)
 

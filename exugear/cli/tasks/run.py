@@ -17,7 +17,7 @@ from exugear.gearbox.parts import LoadCase
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.units import RPM
 from exugear.project import Project
-from exugear.results.findings import run_findings
+from exugear.results.findings import DOUBTS, run_findings
 from exugear.results.folder import time_noted
 from exugear.results.run_file import PARTIAL_NAME, has_pieces, read_run
 from exugear.results.solver_comparison import SolverComparison
@@ -219,7 +219,7 @@ def _summary(
         "energy_not_accounted_for": energy_residual(data),
         "tooth_friction_work_J": float(data["tooth_friction_work"][-1]),
         "load": str(attributes.get("load", "")),
-        **{doubt: str(attributes.get(doubt, "")) for doubt in ("table_doubt", "band_doubt", "bearing_doubt")},
+        **{doubt: str(attributes.get(doubt, "")) for doubt in DOUBTS},
         "longest_tensile_time_s": longest["tensile_time"],
         "longest_contact_loss_s": longest["contact_loss_time"],
         "longest_time_outside_table_s": longest["extrapolation_time"],

@@ -1,0 +1,269 @@
+"""Harmonics of the meshes that a time step folds into the stored band, and the step that keeps them low.
+
+Mesh stiffness varies over the mesh cycle and excites at all multiples of the mesh frequency. A solver that evaluates
+forces once in a step takes a frequency f for f less any multiple of the rate of its steps: harmonics far above the
+stored band then act within it, as lines that do not exist.
+
+The height of such a line is estimated by the linear response at constant speed: each harmonic of the force at constant
+deflection excites, and the deflection of the same mesh responds at the frequency that the harmonic is folded to. It
+counts relative to the highest true line of that mesh at the speeds of the load case.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import takewhile
+
+import numpy as np
+import scipy.linalg
+
+from exugear.gearbox.load_cases import LoadSummary, summarise_loads
+from exugear.gearbox.parts import LoadCase
+from exugear.results.findings import percent_text
+from exugear.system.kernels.cubics import periodic_cubic
+from exugear.system.kernels.meshes import RATE
+from exugear.system.statics import linearise
+from exugear.system.system import Assembly
+from exugear.system.tooth_mesh.element import MeshElement
+from exugear.transient.compiled.integrator import LIGHTEST_DAMPING, Integration, choose_integration
+from exugear.transient.plan import HIGHEST_BAND, MOST_STEPS_PER_SAMPLE, rate_for
+from fe_ste.tools.arrays import Floats
+
+HIGHEST_FOLDED = 0.02
+"""Height of a folded line, over the highest true line of the same mesh, up to which a step is kept: 34 dB. The estimate
+is that of constant speed. In a run-up a folded line passes resonances as many times faster as its harmonic has the mesh
+frequency, and stays lower: 0.4 % where 1.3 % are estimated for the run-ups of the GRC."""
+MOST_REDUCTION = 4
+"""A step is at most so many times shorter than one that is stable and accurate: so much longer takes the run."""
+SPEED_TOLERANCE = 1e-3
+"""Relative difference of speeds from those of the kinematic gear train under the loads."""
+POINTS_PER_PIECE = 16
+"""Samples between two positions in the mesh cycle, which cubics connect: harmonics go on beyond those of positions."""
+LEAST_VARIATION = 1e-9
+"""Harmonics over the mean, and over the largest harmonic, that are round-off."""
+FREQUENCIES = 2000
+"""Frequencies of a response, apart from its resonances."""
+LOWEST = 1.0
+"""Lowest frequency of a response, Hz: what is slower is no line of a spectrum."""
+WIDER = (2.0, 4.0, 8.0, 16.0)
+"""Multiples of the band that are tried where no step is short enough: a wider band has shorter steps by itself."""
+
+
+def force_harmonics(element: MeshElement) -> Floats:
+    """Amplitudes of the harmonics 1, 2, ... of the force of a mesh at constant deflection, over its mean force.
+
+    The deflection is the mean one under the static load. The functions over the mesh cycle are those of the solver.
+    """
+    if element.table is not None and element.load:
+        surface = element.table.surface
+        count = len(surface.coefficients)
+        distance = element.mesh.centre_distance
+        stiffness = np.array([element.load / surface.ste(element.load, n / count, distance) for n in range(count)])
+        force = _between_positions(stiffness)
+    else:
+        stiffness = _between_positions(element.stiffness)
+        force = (stiffness / np.mean(stiffness)) ** _between_positions(element.tangent / element.stiffness)
+    return np.asarray(2.0 * np.abs(np.fft.rfft(force))[1 : max(2, force.size // 2)] / np.sum(force))
+
+
+def _between_positions(values: Floats) -> Floats:
+    """Values (n,) of a periodic cubic through samples over the mesh cycle."""
+    places = np.arange(POINTS_PER_PIECE) / POINTS_PER_PIECE
+    return np.asarray((periodic_cubic(values) @ places ** np.arange(4)[:, None]).ravel())
+
+
+def speed_range(assembly: Assembly, case: LoadCase, loads: LoadSummary) -> tuple[float, float]:
+    """Lowest and highest speed of a load case over its fastest speed.
+
+    The lowest is only known of a train with one degree of freedom under constant torques, and else taken as zero.
+    """
+    slowest = min(abs(loads.start_speed), abs(loads.end_speed)) if loads.start_speed * loads.end_speed > 0.0 else 0.0
+    if case.torque_series is not None or assembly.gearbox.train.degrees_of_freedom > 1 or not loads.fastest_speed:
+        slowest = 0.0
+    return slowest / (loads.fastest_speed or 1.0) * (1.0 - SPEED_TOLERANCE), 1.0 + SPEED_TOLERANCE
+
+
+@dataclass(frozen=True)
+class FoldedLine:
+    """The highest line that a step folds into the stored band.
+
+    Examples
+    --------
+    >>> FoldedLine(0.13, "stage_1", 15, 75000.0, (4925.0, 5075.0)).words
+    'harmonic 15 of the mesh frequency of stage_1, 75000 Hz at the highest speed, acts at 4925 to 5075 Hz, with up ...
+    """
+
+    height: float
+    """Over the highest true line of the same mesh."""
+    mesh: str = ""
+    harmonic: int = 0
+    frequency: float = 0.0
+    """Of that harmonic at the highest speed, Hz."""
+    folded_to: tuple[float, float] = (0.0, 0.0)
+    """Lowest and highest frequency at which it acts, Hz."""
+
+    @property
+    def is_low(self) -> bool:
+        """Whether it is low enough."""
+        return self.height <= HIGHEST_FOLDED
+
+    @property
+    def words(self) -> str:
+        """Description as text."""
+        return (
+            f"harmonic {self.harmonic} of the mesh frequency of {self.mesh}, {self.frequency:.0f} Hz at the highest "
+            f"speed, acts at {self.folded_to[0]:.0f} to {self.folded_to[1]:.0f} Hz, with up to "
+            f"{percent_text(self.height, 2)} of the highest line of this mesh"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class MeshLines:
+    """Harmonics of one mesh, and the response of its deflection to them."""
+
+    name: str
+    slowest: float
+    fastest: float
+    """Lowest and highest mesh frequency, Hz."""
+    harmonics: Floats
+    """(n,) amplitudes of the harmonics 1, 2, ... of the force, over its mean."""
+    frequencies: Floats
+    response: Floats
+    """(k,) Hz, and deflection over force at each."""
+
+    def highest_response(self, low: float, high: float) -> float:
+        """Highest response between two frequencies, Hz."""
+        ends = np.clip([low, high], self.frequencies[0], self.frequencies[-1])
+        inside = self.response[slice(*np.searchsorted(self.frequencies, ends))]
+        return float(max(inside.max(initial=0.0), *np.interp(ends, self.frequencies, self.response)))
+
+    def highest_true_line(self) -> float:
+        """Highest line at a frequency that its harmonic has."""
+        count = min(len(self.harmonics), int(self.frequencies[-1] / max(self.slowest, LOWEST)))
+        responses = [self.highest_response(n * self.slowest, n * self.fastest) for n in range(1, max(1, count) + 1)]
+        return float((self.harmonics[: len(responses)] * responses).max())
+
+    def folded_lines(self, rate: float, band: float) -> Iterator[FoldedLine]:
+        """Lines up to the end of the band (Hz) that so many steps in a second (Hz) fold to other frequencies."""
+        true_line = self.highest_true_line()
+        for n in np.flatnonzero(self.harmonics > LEAST_VARIATION * self.harmonics.max()) + 1:
+            low, high = n * self.slowest, n * self.fastest
+            for times in range(max(1, math.ceil((low - band) / rate)), math.floor((high + band) / rate) + 1):
+                below, above = max(low - times * rate, -band), min(high - times * rate, band)
+                ends = sorted((abs(below), abs(above)))
+                folded_to = (0.0 if below < 0.0 < above else ends[0], ends[1])
+                height = float(self.harmonics[n - 1] * self.highest_response(*folded_to) / true_line)
+                yield FoldedLine(height, self.name, int(n), float(high) / (1.0 + SPEED_TOLERANCE), folded_to)
+
+
+def mesh_lines(assembly: Assembly, case: LoadCase, loads: LoadSummary, band: float) -> tuple[MeshLines, ...]:
+    """Lines of all meshes whose stiffness varies over the mesh cycle, for a stored band (Hz)."""
+    low, high = speed_range(assembly, case, loads)
+    varying = {}
+    for n, element in enumerate(assembly.elements):
+        harmonics = force_harmonics(element)
+        if loads.mesh_frequencies[element.mesh.name] > 0.0 and harmonics.max() > LEAST_VARIATION:
+            varying[n] = harmonics
+    if not varying:
+        return ()
+    fastest = max(loads.mesh_frequencies.values())
+    frequencies, responses = _mesh_responses(assembly, max(band, high * fastest))
+    found = []
+    for n, harmonics in varying.items():
+        name = assembly.mesh_names[n]
+        frequency = loads.mesh_frequencies[name]
+        found.append(MeshLines(name, low * frequency, high * frequency, harmonics, frequencies, responses[n]))
+    return tuple(found)
+
+
+def _mesh_responses(assembly: Assembly, highest: float) -> tuple[Floats, Floats]:
+    """Frequencies (k,) up to the highest, Hz, and magnitude of the deflection of each mesh by a force on its teeth.
+
+    The response (meshes, k), m/N, is a sum over the undamped modes, each with its own damping.
+    """
+    meshes = assembly.linear_meshes()
+    linear = linearise(assembly.unloaded.with_linear_supports(), np.zeros(assembly.size), meshes)
+    free = scipy.linalg.orth(assembly.motions)
+    mass, stiffness = (free.T @ (matrix + matrix.T) @ free / 2.0 for matrix in (linear.mass, linear.total_stiffness))
+    squares, shapes = scipy.linalg.eigh(stiffness, mass)
+    shapes = free @ shapes
+    rates = np.sqrt(np.maximum(squares, 0.0))
+    damping = np.einsum("im,ij,jm->m", shapes, linear.total_damping, shapes, optimize=True)
+    damping = np.maximum(damping, 2.0 * LIGHTEST_DAMPING * rates)
+    at_rest = np.zeros(assembly.size)
+    rows = np.array([assembly.mesh_states(at_rest, v, meshes)[:, RATE] for v in np.eye(assembly.size)]).T
+    shares = (rows @ shapes) ** 2
+    resonances = rates / (2.0 * np.pi)
+    resonances = resonances[(resonances > LOWEST) & (resonances < highest)]
+    frequencies = np.union1d(np.linspace(LOWEST, highest, FREQUENCIES), resonances)
+    turning = 2.0 * np.pi * frequencies
+    return frequencies, np.abs(shares @ (1.0 / (squares[:, None] - turning**2 + 1j * damping[:, None] * turning)))
+
+
+def highest_folded_line(lines: tuple[MeshLines, ...], rate: float, band: float) -> FoldedLine:
+    """Highest line that so many steps in a second (Hz) fold into the band (Hz); of height zero if there is none."""
+    found = (line for mesh in lines for line in mesh.folded_lines(rate, band))
+    return max(found, key=lambda line: line.height, default=FoldedLine(0.0))
+
+
+# Choice of the step
+
+
+def shorter_step(
+    lines: tuple[MeshLines, ...], step: float, sample_rate: float, band: float
+) -> tuple[float, FoldedLine]:
+    """Longest step (s) that folds low lines only into the band (Hz), not longer than a step that divides a sample.
+
+    It divides a sample as well. Where none within the reduction that is permitted does, it is the one with the lowest
+    of these lines.
+    """
+    divisions = round(1.0 / (step * sample_rate))
+    most = min(MOST_REDUCTION * divisions, MOST_STEPS_PER_SAMPLE)
+    best = step, highest_folded_line(lines, 1.0 / step, band)
+    while not best[1].is_low:
+        divisions += max(1, divisions // 20)
+        if divisions > most:
+            break
+        line = highest_folded_line(lines, divisions * sample_rate, band)
+        if line.height < best[1].height:
+            best = 1.0 / sample_rate / divisions, line
+    return best
+
+
+def choose_against_folding(
+    assembly: Assembly, case: LoadCase, total: float, sample_rate: float, band: float, integrator: str | None = None
+) -> tuple[Integration, FoldedLine]:
+    """Choose method and step by `choose_integration`, with a shorter step where harmonics of the meshes require one.
+
+    The step depends on the duration of the load case, not on the simulated time (s), so that a run which is resumed for
+    longer keeps its step. The folded line is that at the speeds of both.
+    """
+    chosen = choose_integration(assembly, sample_rate, band, integrator=integrator)
+    planned = summarise_loads(assembly.gearbox, case, assembly.inertias, case.duration)
+    step, line = shorter_step(mesh_lines(assembly, case, planned, band), chosen.step, sample_rate, band)
+    if step < chosen.step:
+        chosen = choose_integration(assembly, sample_rate, band, step=step, integrator=integrator)
+    if total > case.duration:
+        loads = summarise_loads(assembly.gearbox, case, assembly.inertias, total)
+        line = highest_folded_line(mesh_lines(assembly, case, loads, band), 1.0 / step, band)
+    return chosen, line
+
+
+def folding_warning(
+    line: FoldedLine,
+    assembly: Assembly,
+    case: LoadCase,
+    total: float,
+    band: float,
+    integrator: str | None = None,
+) -> str:
+    """Return a warning about a line that the chosen step folds into the band (Hz), with what helps; empty if none."""
+    if line.is_low:
+        return ""
+    for wider in takewhile(lambda wider: wider <= HIGHEST_BAND, (factor * band for factor in WIDER)):
+        _, left = choose_against_folding(assembly, case, total, rate_for(wider), wider, integrator)
+        if left.is_low:
+            return f"folded harmonics: {line.words}; use exugear run --band {wider:g}, which has shorter steps"
+    return f"folded harmonics: {line.words}; check the stiffness over the mesh cycle for jumps"
