@@ -5,8 +5,8 @@ forces once in a step takes a frequency f for f less any multiple of the rate of
 stored band then act within it, as lines that do not exist.
 
 The height of such a line is estimated by the linear response at constant speed: each harmonic of the force at constant
-deflection excites, and the deflection of the same mesh responds at the frequency that the harmonic is folded to. It
-counts relative to the highest true line of that mesh at the speeds of the load case.
+deflection excites, and the deflection of the mesh and the overall transmission error respond at the frequency that the
+harmonic is folded to. A line counts relative to the highest true line of the same mesh at the speeds of the load case.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from exugear.gearbox.parts import LoadCase
 from exugear.results.findings import percent_text
 from exugear.system.kernels.cubics import periodic_cubic
 from exugear.system.kernels.meshes import RATE
+from exugear.system.modes import overall_row
 from exugear.system.statics import linearise
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.element import MeshElement
@@ -121,7 +122,7 @@ class FoldedLine:
 
 @dataclass(frozen=True, eq=False)
 class MeshLines:
-    """Harmonics of one mesh, and the response of its deflection to them."""
+    """Harmonics of one mesh, and the response to them."""
 
     name: str
     slowest: float
@@ -130,31 +131,35 @@ class MeshLines:
     harmonics: Floats
     """(n,) amplitudes of the harmonics 1, 2, ... of the force, over its mean."""
     frequencies: Floats
-    response: Floats
-    """(k,) Hz, and deflection over force at each."""
+    responses: Floats
+    """(k,) Hz, and (2, k) deflection of the mesh and overall transmission error over its force at each, m/N."""
 
-    def highest_response(self, low: float, high: float) -> float:
-        """Highest response between two frequencies, Hz."""
+    def highest_responses(self, low: float, high: float) -> Floats:
+        """Highest of both responses between two frequencies, Hz."""
         ends = np.clip([low, high], self.frequencies[0], self.frequencies[-1])
-        inside = self.response[slice(*np.searchsorted(self.frequencies, ends))]
-        return float(max(inside.max(initial=0.0), *np.interp(ends, self.frequencies, self.response)))
+        inside = self.responses[:, slice(*np.searchsorted(self.frequencies, ends))].max(axis=1, initial=0.0)
+        at_ends = [np.interp(ends, self.frequencies, response).max() for response in self.responses]
+        return np.asarray(np.maximum(inside, at_ends))
 
-    def highest_true_line(self) -> float:
-        """Highest line at a frequency that its harmonic has."""
+    def highest_true_lines(self) -> Floats:
+        """Highest lines, of both responses, at frequencies that harmonics have."""
         count = min(len(self.harmonics), int(self.frequencies[-1] / max(self.slowest, LOWEST)))
-        responses = [self.highest_response(n * self.slowest, n * self.fastest) for n in range(1, max(1, count) + 1)]
-        return float((self.harmonics[: len(responses)] * responses).max())
+        responses = [self.highest_responses(n * self.slowest, n * self.fastest) for n in range(1, max(1, count) + 1)]
+        return np.asarray((self.harmonics[: len(responses), None] * responses).max(axis=0))
 
     def folded_lines(self, rate: float, band: float) -> Iterator[FoldedLine]:
         """Lines up to the end of the band (Hz) that so many steps in a second (Hz) fold to other frequencies."""
-        true_line = self.highest_true_line()
+        # A mesh that does not move the output has no lines there, true or folded.
+        true_lines = np.maximum(self.highest_true_lines(), np.finfo(np.float64).tiny)
         for n in np.flatnonzero(self.harmonics > LEAST_VARIATION * self.harmonics.max()) + 1:
             low, high = n * self.slowest, n * self.fastest
-            for times in range(max(1, math.ceil((low - band) / rate)), math.floor((high + band) / rate) + 1):
+            first, last = max(1, math.ceil((low - band) / rate)), math.floor((high + band) / rate)
+            # Between the first and the last multiple of the rate, speeds pass through the whole band.
+            for times in sorted({first, min(first + 1, last), last}) if first <= last else ():
                 below, above = max(low - times * rate, -band), min(high - times * rate, band)
                 ends = sorted((abs(below), abs(above)))
                 folded_to = (0.0 if below < 0.0 < above else ends[0], ends[1])
-                height = float(self.harmonics[n - 1] * self.highest_response(*folded_to) / true_line)
+                height = float((self.harmonics[n - 1] * self.highest_responses(*folded_to) / true_lines).max())
                 yield FoldedLine(height, self.name, int(n), float(high) / (1.0 + SPEED_TOLERANCE), folded_to)
 
 
@@ -179,9 +184,10 @@ def mesh_lines(assembly: Assembly, case: LoadCase, loads: LoadSummary, band: flo
 
 
 def _mesh_responses(assembly: Assembly, highest: float) -> tuple[Floats, Floats]:
-    """Frequencies (k,) up to the highest, Hz, and magnitude of the deflection of each mesh by a force on its teeth.
+    """Frequencies (k,) up to the highest, Hz, and responses (meshes, 2, k) to a force on the teeth of each mesh, m/N.
 
-    The response (meshes, k), m/N, is a sum over the undamped modes, each with its own damping.
+    The responses, of its deflection and of the overall transmission error, are sums over the undamped modes, each with
+    its own damping.
     """
     meshes = assembly.linear_meshes()
     linear = linearise(assembly.unloaded.with_linear_supports(), np.zeros(assembly.size), meshes)
@@ -194,7 +200,8 @@ def _mesh_responses(assembly: Assembly, highest: float) -> tuple[Floats, Floats]
     damping = np.maximum(damping, 2.0 * LIGHTEST_DAMPING * rates)
     at_rest = np.zeros(assembly.size)
     rows = np.array([assembly.mesh_states(at_rest, v, meshes)[:, RATE] for v in np.eye(assembly.size)]).T
-    shares = (rows @ shapes) ** 2
+    by_mode = rows @ shapes
+    shares = np.stack([by_mode**2, by_mode * (overall_row(assembly) @ shapes)], axis=1)
     resonances = rates / (2.0 * np.pi)
     resonances = resonances[(resonances > LOWEST) & (resonances < highest)]
     frequencies = np.union1d(np.linspace(LOWEST, highest, FREQUENCIES), resonances)
