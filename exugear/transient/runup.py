@@ -2,8 +2,8 @@
 
 Two solvers take the same assembly: `exugear.transient.compiled.solver`, and Exudyn as the model of record. Both hand
 their states to one `exugear.transient.recorder.Recorder`, which filters, accounts for energy and writes. Without a step
-asked for, `exugear.transient.compiled.integrator.choose_integration` finds method and step, stable and accurate up to
-the end of the band: 6.4 kHz is the high-speed mesh of the GRC at 215 rpm. Exudyn is loaded only where it integrates.
+asked for, `exugear.transient.folding.choose_against_folding` finds method and step, stable and accurate up to the end of
+the band: 6.4 kHz is the high-speed mesh of the GRC at 215 rpm. Exudyn is loaded only where it integrates.
 """
 
 from __future__ import annotations
