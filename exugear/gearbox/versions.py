@@ -12,7 +12,7 @@ REDUCTION = 2
 #: Eigenmodes (`exugear.system.modes`, and the models and matrices of `exugear.system.system`).
 MODES = 5
 #: Runs in time (`exugear.transient`, both solvers, the models, signals and filters).
-RUN = 12
+RUN = 13
 #: Life of gears and bearings (`exugear.life`, and the root stress of `fe_ste.root_stress`).
 LIFE = 12
 #: Steady-state responses (`exugear.steady`, and all methods that modes use).
