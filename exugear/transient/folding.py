@@ -60,8 +60,9 @@ def force_harmonics(element: MeshElement) -> Floats:
     if element.table is not None and element.load:
         surface = element.table.surface
         count = len(surface.coefficients)
+        load = min(element.load, float(surface.root_force[-1]) ** 2)
         distance = element.mesh.centre_distance
-        stiffness = np.array([element.load / surface.ste(element.load, n / count, distance) for n in range(count)])
+        stiffness = np.array([load / surface.ste(load, n / count, distance) for n in range(count)])
         force = _between_positions(stiffness)
     else:
         stiffness = _between_positions(element.stiffness)

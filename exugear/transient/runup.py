@@ -2,8 +2,8 @@
 
 Two solvers take the same assembly: `exugear.transient.compiled.solver`, and Exudyn as the model of record. Both hand
 their states to one `exugear.transient.recorder.Recorder`, which filters, accounts for energy and writes. Without a step
-asked for, `exugear.transient.folding.choose_against_folding` finds method and step, stable and accurate up to the end of
-the band: 6.4 kHz is the high-speed mesh of the GRC at 215 rpm. Exudyn is loaded only where it integrates.
+asked for, `exugear.transient.folding.choose_against_folding` finds method and step, stable and accurate up to the end
+of the band: 6.4 kHz is the high-speed mesh of the GRC at 215 rpm. Exudyn is loaded only where it integrates.
 """
 
 from __future__ import annotations
@@ -195,7 +195,8 @@ def simulate(
     bodies : by body name, reduced flexible bodies, required by the variant `flexible`
     duration : simulated time, s; the load case's by default, that of the stopped run where one is resumed
     step
-        Integration step, s; by default chosen from `band`, the fastest eigenfrequency and the harmonics of the meshes.
+        Integration step, s; by default chosen from `band`, the fastest eigenfrequency and the harmonics of the meshes,
+        which a given step may fold into the band.
     band, sample_rate : highest frequency whose amplitude is kept, and stored rate, Hz; the rate must divide the steps
     solver : {"compiled", "exudyn"}, optional
         The compiled one where it applies by default; a body in a floating frame needs Exudyn.
