@@ -17,8 +17,8 @@ from fe_ste.tools.display import life_text
 LEAST_DAMAGE = 1e-3
 """Smaller damages are printed as such."""
 NOTHING_RATED = (
-    "no part is rated: a gear requires [rating.gears.NAME] and a pair with a table, a bearing a table [.catalogue] and "
-    "a variant with bearings"
+    "no part is rated: the rating of gears requires [rating.gears.NAME] and a transmission error table of their pair, "
+    "that of bearings a table [.catalogue] and a variant with bearings"
 )
 _column = partial(Column, missing="")
 CONTACT_LEGEND = (

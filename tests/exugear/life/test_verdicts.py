@@ -338,4 +338,4 @@ def test_a_life_in_which_no_part_is_rated_is_not_called_reached(tmp_path):
     result = exugear("life", case, "--out", tmp_path / "results")
     assert result.exit_code == 0, result.output
     assert "Life of 1 year, 1,000 h, unknown: no part is rated" in result.stdout
-    assert "Warning: no part is rated: a gear requires [rating.gears.NAME]" in result.stderr
+    assert "Warning: no part is rated: the rating of gears requires [rating.gears.NAME]" in result.stderr
