@@ -11,9 +11,8 @@ harmonic is folded to. A line counts relative to the highest true line of the sa
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import takewhile
 
 import numpy as np
@@ -135,33 +134,46 @@ class MeshLines:
     responses: Floats
     """(k,) Hz, and (2, k) deflection of the mesh and overall transmission error over its force at each, m/N."""
 
-    def highest_responses(self, low: float, high: float) -> Floats:
-        """Highest of both responses between two frequencies, Hz."""
+    def highest_responses(self, low: Floats, high: Floats) -> Floats:
+        """Highest of both responses between frequencies (m,) and (m,), Hz, as (2, m)."""
         ends = np.clip([low, high], self.frequencies[0], self.frequencies[-1])
-        inside = self.responses[:, slice(*np.searchsorted(self.frequencies, ends))].max(axis=1, initial=0.0)
-        at_ends = [np.interp(ends, self.frequencies, response).max() for response in self.responses]
-        return np.asarray(np.maximum(inside, at_ends))
+        at_ends = np.array([np.interp(ends, self.frequencies, response).max(axis=0) for response in self.responses])
+        first, last = np.searchsorted(self.frequencies, ends)
+        # A zero behind the responses lets an interval end with them.
+        padded = np.pad(self.responses, ((0, 0), (0, 1)))
+        inside = np.maximum.reduceat(padded, np.stack([first, last], axis=1).ravel(), axis=1)[:, ::2]
+        return np.asarray(np.maximum(np.where(first < last, inside, 0.0), at_ends))
 
+    @cached_property
     def highest_true_lines(self) -> Floats:
-        """Highest lines, of both responses, at frequencies that harmonics have."""
+        """(2,) highest lines, of both responses, at frequencies that harmonics have."""
         count = min(len(self.harmonics), int(self.frequencies[-1] / max(self.slowest, LOWEST)))
-        responses = [self.highest_responses(n * self.slowest, n * self.fastest) for n in range(1, max(1, count) + 1)]
-        return np.asarray((self.harmonics[: len(responses), None] * responses).max(axis=0))
-
-    def folded_lines(self, rate: float, band: float) -> Iterator[FoldedLine]:
-        """Lines up to the end of the band (Hz) that so many steps in a second (Hz) fold to other frequencies."""
+        n = np.arange(1.0, max(1, count) + 1.0)
+        lines = self.harmonics[: len(n)] * self.highest_responses(n * self.slowest, n * self.fastest)
         # A mesh that does not move the output has no lines there, true or folded.
-        true_lines = np.maximum(self.highest_true_lines(), np.finfo(np.float64).tiny)
-        for n in np.flatnonzero(self.harmonics > LEAST_VARIATION * self.harmonics.max()) + 1:
-            low, high = n * self.slowest, n * self.fastest
-            first, last = max(1, math.ceil((low - band) / rate)), math.floor((high + band) / rate)
-            # Between the first and the last multiple of the rate, speeds pass through the whole band.
-            for times in sorted({first, min(first + 1, last), last}) if first <= last else ():
-                below, above = max(low - times * rate, -band), min(high - times * rate, band)
-                ends = sorted((abs(below), abs(above)))
-                folded_to = (0.0 if below < 0.0 < above else ends[0], ends[1])
-                height = float((self.harmonics[n - 1] * self.highest_responses(*folded_to) / true_lines).max())
-                yield FoldedLine(height, self.name, int(n), float(high) / (1.0 + SPEED_TOLERANCE), folded_to)
+        return np.asarray(np.maximum(lines.max(axis=1), np.finfo(np.float64).tiny))
+
+    def highest_folded_line(self, rate: float, band: float) -> FoldedLine:
+        """Highest line up to the end of the band (Hz) that so many steps in a second (Hz) fold to other frequencies."""
+        n = np.flatnonzero(self.harmonics > LEAST_VARIATION * self.harmonics.max()) + 1
+        first = np.maximum(1, np.ceil((n * self.slowest - band) / rate))
+        last = np.floor((n * self.fastest + band) / rate)
+        # Between the first and the last multiple of the rate, speeds pass through the whole band.
+        times = np.stack([first, np.minimum(first + 1, last), last], axis=1)[first <= last]
+        n = n[first <= last]
+        if not n.size:
+            return FoldedLine(0.0)
+        below = np.maximum((n * self.slowest)[:, None] - times * rate, -band)
+        above = np.minimum((n * self.fastest)[:, None] - times * rate, band)
+        lowest, highest = np.sort([np.abs(below), np.abs(above)], axis=0)
+        lowest[(below < 0.0) & (above > 0.0)] = 0.0
+        responses = self.highest_responses(lowest.ravel(), highest.ravel()) / self.highest_true_lines[:, None]
+        heights = self.harmonics[n - 1, None] * responses.max(axis=0).reshape(times.shape)
+        place = np.unravel_index(heights.argmax(), heights.shape)
+        harmonic = int(n[place[0]])
+        frequency = harmonic * self.fastest / (1.0 + SPEED_TOLERANCE)
+        folded_to = float(lowest[place]), float(highest[place])
+        return FoldedLine(float(heights[place]), self.name, harmonic, frequency, folded_to)
 
 
 def mesh_lines(assembly: Assembly, case: LoadCase, loads: LoadSummary, band: float) -> tuple[MeshLines, ...]:
@@ -212,7 +224,7 @@ def _mesh_responses(assembly: Assembly, highest: float) -> tuple[Floats, Floats]
 
 def highest_folded_line(lines: tuple[MeshLines, ...], rate: float, band: float) -> FoldedLine:
     """Highest line that so many steps in a second (Hz) fold into the band (Hz); of height zero if there is none."""
-    found = (line for mesh in lines for line in mesh.folded_lines(rate, band))
+    found = (mesh.highest_folded_line(rate, band) for mesh in lines)
     return max(found, key=lambda line: line.height, default=FoldedLine(0.0))
 
 
