@@ -58,9 +58,10 @@ compiling=$$!; $(EXUGEAR) ste $(CASE) --out $(1) $(2); code=$$?; wait $$compilin
 endef
 
 # The inertia sets side by side: each runs up both variants, takes their modes and the steady response on bearings, one
-# process after the other; the first shows its progress, the others speak when all are done. The beginning of the first
-# run-up on bearings is integrated by Exudyn, too. Then the report, which compares all of them, and whose headline is
-# that of the steady response.
+# process after the other; the first shows its progress, the others speak when all are done. The first one ends with the
+# steady response and the others begin with it, so that its loops are compiled once. The beginning of the first run-up on
+# bearings is integrated by Exudyn, too. Then the report, which compares all of them, and whose headline is that of the
+# steady response.
 #   $(call dynamics,FOLDER,INERTIA SETS,OPTIONS OF run)
 define dynamics
 @mkdir -p $(1)
@@ -72,11 +73,13 @@ define dynamics
 	for variant in rigid bushing; do \
 		$(EXUGEAR) modes $(CASE) --variant $$variant --inertias $$1 --out $(1) --all >$(1)/modes-$$variant-$$1.txt || return; \
 	done; \
-	$(EXUGEAR) steady $(CASE) --variant bushing --inertias $$1 --out $(1) --all >$(1)/steady-bushing-$$1.txt || return; \
+}; \
+steady_of() { \
+	$(EXUGEAR) steady $(CASE) --variant bushing --inertias $$1 --out $(1) --all >$(1)/steady-bushing-$$1.txt; \
 }; \
 others=; \
-for inertias in $(wordlist 2,9,$(2)); do of_set $$inertias >$(1)/run-$$inertias.log 2>&1 & others="$$others $$!"; done; \
-of_set $(firstword $(2)); code=$$?; \
+for inertias in $(wordlist 2,9,$(2)); do { steady_of $$inertias && of_set $$inertias; } >$(1)/run-$$inertias.log 2>&1 & others="$$others $$!"; done; \
+of_set $(firstword $(2)) && steady_of $(firstword $(2)); code=$$?; \
 for other in $$others; do wait $$other || code=1; done; \
 for inertias in $(wordlist 2,9,$(2)); do cat $(1)/run-$$inertias.log; done; \
 exit $$code
