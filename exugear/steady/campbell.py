@@ -381,7 +381,8 @@ def frequencies_over_angle(system: MeanSystem, tracks: ModeTracks) -> Floats:
     if not system.over_angles:
         return found
     middle = len(tracks.speeds) // 2
-    held = [mean_modes(one, float(tracks.speeds[middle]))[0].imag for one in system.at_angles()]
+    speed = float(tracks.speeds[middle])
+    held = side_by_side(lambda one: mean_modes(one, speed)[0].imag, list(system.at_angles()))
     if not len(held[0]):
         return found
     # Rolling is free at zero angle. Elsewhere the state is not quite the static one, which gives it a low frequency.

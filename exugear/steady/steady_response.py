@@ -390,10 +390,13 @@ def response_of(
     solved = points if is_solved.all() else points.part(is_solved)
     linear = solver.linear
     frozen = linear.frozen
-    explained = []
-    for crossing in () if linear.loses_contact else found[:PEAKS_WITH_CONTRIBUTIONS]:
+
+    def explained(crossing: Crossing) -> tuple[int, Contributions]:
+        """Line of a crossing and what makes it at its peak."""
         speed = loudest_near(frozen, crossing.speed, 2.0 * crossing.damping, crossing.line)
-        explained.append((crossing.line, contributions(frozen, speed, crossing.line)))
+        return crossing.line, contributions(frozen, speed, crossing.line)
+
+    strongest = () if linear.loses_contact else found[:PEAKS_WITH_CONTRIBUTIONS]
     band = no_band(tuple(quantity.name for quantity in linear.quantities))
     if settings.method != "nonlinear" and not linear.loses_contact:
         band = damping_band(linear, settings.method, solved.speed, solved.amplitude, solved.jumps)
@@ -412,7 +415,7 @@ def response_of(
         solved=solved,
         unsolved=tuple(zip(points.speed[~is_solved].tolist(), points.remark[~is_solved].tolist(), strict=True)),
         crossings=found,
-        contributions=tuple(explained),
+        contributions=tuple(each_in_forks(explained, strongest)),
         sound_contributions=tuple(_sound_contributions(linear, solved, operation)),
         folds=folds,
         branch_ended=ended,

@@ -324,9 +324,14 @@ class Quantity:
         """
         counts = np.broadcast_to(counted, sizes.shape)
         found = [peak for peak in peaks_of_lines(sizes, prominence) if counts[peak]]
-        found.sort(key=lambda peak: -sizes[peak])
-        highest = float(sizes[found[0]]) if found else 0.0
-        return [peak for peak in found if sizes[peak] > round_off(self.name, max(highest, np.nanmax(sizes[peak[0]])))]
+        if not found:
+            return []
+        points, lines = np.transpose(found)
+        heights = sizes[points, lines]
+        highest = float(heights.max())
+        least = np.array([round_off(self.name, max(highest, float(top))) for top in np.fmax.reduce(sizes, axis=1)])
+        descending = np.argsort(-heights, kind="stable")
+        return [found[n] for n in descending[(heights > least[points])[descending]]]
 
 
 SIGNALS = {
