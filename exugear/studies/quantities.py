@@ -185,20 +185,22 @@ OVERALL = "overall_dte"
 
 
 def _settled(results: PointResults, signal: str) -> Floats:
-    """Return the values of a signal over time, without the beginning; ``coupling_torque shaft`` is one of several."""
-    name, _, part = signal.partition(" ")
+    """Return the values of a signal over time, without the beginning.
+
+    Names behind that of the signal choose parts of it, as in ``coupling_torque shaft`` and ``support_force left x``.
+    """
+    name, *parts = signal.split(" ")
     if name not in results.run.variables or results.run[name].dims[:1] != ("time",):
         known = ", ".join(
             str(name) for name, variable in results.run.variables.items() if variable.dims[:1] == ("time",)
         )
         raise PointError(f"no signal {signal!r} over time; signals are {known}")
     found = results.run[name]
-    if part:
-        dimensions = found.dims[1:]
-        parts = [str(own) for own in found[dimensions[0]].to_numpy()] if len(dimensions) == 1 else []
-        if part not in parts:
-            raise PointError(f"no signal {signal!r}; {nearest_names(part, parts)}")
-        found = found[:, parts.index(part)]
+    for part in parts:
+        known_parts = [str(own) for own in found[found.dims[1]].to_numpy()] if found.ndim > 1 else []
+        if part not in known_parts:
+            raise PointError(f"no signal {signal!r}; {nearest_names(part, known_parts)}")
+        found = found[:, known_parts.index(part)]
     values = found.to_numpy()
     return np.asarray(values[int(SETTLING * len(values)) :], dtype=np.float64)
 

@@ -56,7 +56,7 @@ from exugear.studies.sampling import (
 from exugear.studies.sections import StudyError, StudyFile, parse_study, read_study_file
 from exugear.system.bearings.stiffness import elastic_names, mounts_at_work
 from exugear.system.build import assemble
-from exugear.system.signals import signals_of, turning_bodies
+from exugear.system.signals import AXES, signals_of, turning_bodies
 from exugear.system.statics import BalanceError
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
@@ -215,29 +215,16 @@ def errors_of_needs(study: StudyFile, kept: Mapping[str, Output], gearbox: Gearb
 
 def errors_of_signals(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choice) -> Iterator[str]:
     """Report signals and orders that neither runs nor steady-state responses of this gearbox have."""
-    tabled = choice.mesh_model == "table"
-    jointed = choice.variant.spins_only
-    of_runs = [
-        signal
-        for signal in signals_of(tabled, jointed, bool(gearbox.couplings))
-        if signal.stored and signal.dimensions[0] == "time"
-    ]
-    parts = {
-        "mesh": [mesh.name for mesh in gearbox.meshes],
-        "coupling": [coupling.name for coupling in gearbox.couplings],
-        "body": turning_bodies(gearbox, [body.name for body in gearbox.bodies() if not body.fixed]),
-    }
-    named_parts = [f"{own.name} {part}" for own in of_runs for part in parts.get(own.dimensions[-1], ())]
+    of_runs, single_of_runs = _run_signals(gearbox, choice)
     in_orders = [*(mesh.family for mesh in gearbox.meshes), *(body.name for body in gearbox.bodies())]
     named = [output.options.get("signal", OVERALL) for output in kept.values() if output.quantity.needs == "steady"]
     steady = _steady_signals(gearbox, choice) if any(signal != OVERALL for signal in named) else []
     for name, output in kept.items():
         signal = str(output.options.get("signal", OVERALL))
         if output.quantity.needs == "run":
-            single = output.quantity.dimension != ""
-            known = [of_run.name for of_run in of_runs if not single or len(of_run.dimensions) == 1]
-            if signal not in known and signal not in named_parts:
-                yield f"outputs.{name}.signal = {signal[:200]!r}: no such signal; there are {listed(known)}"
+            known = of_runs if output.quantity.dimension == "" else single_of_runs
+            if signal not in known:
+                yield f"outputs.{name}.signal = {signal[:200]!r}: no such signal; {nearest_names(signal, known)}"
         elif output.quantity.needs == "steady":
             if signal != OVERALL and named_amplitudes(steady, np.zeros(len(steady), complex), signal) is None:
                 places = dict.fromkeys(" ".join(name.split(" ")[:2]) for name in steady)
@@ -251,6 +238,34 @@ def errors_of_signals(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choi
                     f"outputs.{name}.line = {str(line)[:200]!r}: no such order; orders are such as {in_orders[0]} and "
                     f"2 x {in_orders[0]}, of {listed(list(dict.fromkeys(in_orders)))}"
                 )
+
+
+def _run_signals(gearbox: Gearbox, choice: Choice) -> tuple[list[str], list[str]]:
+    """Return the names of all signals of a run, and of those that have one value at a time.
+
+    One that has several values, such as ``support_force``, has its parts as well: ``support_force left x``.
+    """
+    jointed = choice.variant.spins_only
+    supports = gearbox.joints if jointed else gearbox.bearings
+    mounts = mounts_at_work(gearbox) if choice.variant.is_elastic else ()
+    parts = {
+        "mesh": [mesh.name for mesh in gearbox.meshes],
+        "support": [support.name for support in (*supports, *mounts)],
+        "axis": AXES,
+        "coupling": [coupling.name for coupling in gearbox.couplings],
+        "body": turning_bodies(gearbox, [body.name for body in gearbox.bodies() if not body.fixed]),
+    }
+    found: list[str] = []
+    single: list[str] = []
+    for signal in signals_of(choice.mesh_model == "table", jointed, bool(gearbox.couplings)):
+        if signal.stored and signal.dimensions[0] == "time":
+            names = [signal.name]
+            for dimension in signal.dimensions[1:]:
+                found += names
+                names = [f"{name} {part}" for name in names for part in parts[dimension]]
+            found += names
+            single += names
+    return sorted(found, key=lambda name: name.count(" ")), single
 
 
 def _steady_signals(gearbox: Gearbox, choice: Choice) -> list[str]:

@@ -33,6 +33,7 @@ from exugear.studies.executors import (
 )
 from exugear.studies.point_results import Shared
 from exugear.studies.runner import Shard, run_study, task_of
+from exugear.studies.sections import StudyError
 from fe_ste.transmission_error.table import MeshTable
 
 from ..cases.spur import COARSE_INPUT
@@ -264,6 +265,23 @@ def test_memory_of_a_worker_does_not_grow_with_its_points(tmp_path):
     swept = run_study(study, tmp_path / "out", HERE)
     memory = swept.dataset["memory"].to_numpy()
     assert memory[-1] - memory[60] < 20e6  # a gearbox that stayed behind would be 0.2 MB a point
+
+
+def test_outputs_of_runs_take_a_bearing_and_a_direction(tmp_path, monkeypatch):
+    monkeypatch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
+    signals = [f"support_force bearing_1 {axis}" for axis in "xyz"] + ["support_force bearing_1"]
+    outputs = {f"f{n}": {"quantity": "peak_to_peak", "signal": signal} for n, signal in enumerate(signals)}
+    parameters = {"seat": {"path": "housing.factor", "values": [0.4]}}
+    choice = {"variant": "bushing", "mesh_model": "line_of_action"}
+    study = small_study(tmp_path, parameters=parameters, outputs=outputs, choice=choice, run={"duration_s": 0.05})
+    swept = run_study(study, tmp_path / "out", HERE)
+    *directions, largest = (float(swept.dataset[f"f{n}"].max()) for n in range(len(signals)))
+    assert largest == max(directions) > 0.0
+    for quantity, name in (("rms", "support_force bearing_1 w"), ("run_harmonics", "support_force bearing_1")):
+        of_mesh = {"mesh": "spur"} if quantity == "run_harmonics" else {}
+        outputs = {"f": {"quantity": quantity, "signal": name, **of_mesh}}
+        with pytest.raises(StudyError, match=f"outputs.f.signal = '{name}': no such signal; did you mean"):
+            small_study(tmp_path, parameters=parameters, outputs=outputs, run={"duration_s": 0.05})
 
 
 @pytest.mark.validation
