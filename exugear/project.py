@@ -532,7 +532,7 @@ class Project(ReprMixin):
         progress : called with the number of solved static states and the total
         counted : result of `checked_loads`; by default the loads are read again
         """
-        from exugear.life.dynamic_factors import factors, source_hash
+        from exugear.life.dynamic_factors import factors
         from exugear.life.gear_life import pair_stresses
         from exugear.life.life import compute_life, life_hash, rating_of  # root stress modules, not needed by a run
         from exugear.life.life_file import stored_life, write_life
@@ -543,10 +543,8 @@ class Project(ReprMixin):
             self.tables(grid=LAWS[self.choice.mesh_model].needs_axes)
         assembly = self.assembly()
         requests = self.stress_tables(counted)
-        tables = {request.name: request.wanted.hash for request in requests}
-        rating = rating_of(self.gearbox)
-        dynamic = factors(assembly, rating, self.folder, counted.body)
-        digest = life_hash(assembly, counted, tables, source_hash(assembly, rating, self.folder))
+        dynamic = factors(assembly, rating_of(self.gearbox), self.folder, counted.body)
+        digest = life_hash(assembly, counted, requests, self.folder)
         angles = Store(self.life_path.with_suffix(".partial.npz"), digest)
         kept = stored_life(self.life_path, digest)
         if kept is not None:
@@ -632,16 +630,11 @@ class Project(ReprMixin):
 
     def stored_life(self, counted: CountedLoads) -> xr.Dataset | None:
         """Return the stored life computed from exactly this input; None without one."""
-        from exugear.life.dynamic_factors import source_hash
-        from exugear.life.life import life_hash, rating_of
+        from exugear.life.life import life_hash
         from exugear.life.life_file import stored_life
 
-        assembly = self.assembly()
-        rating = rating_of(self.gearbox)
-        tables = {request.name: request.wanted.hash for request in self.stress_tables(counted)}
-        return stored_life(
-            self.life_path, life_hash(assembly, counted, tables, source_hash(assembly, rating, self.folder))
-        )
+        digest = life_hash(self.assembly(), counted, self.stress_tables(counted), self.folder)
+        return stored_life(self.life_path, digest)
 
     @property
     def life_path(self) -> Path:

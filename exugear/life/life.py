@@ -7,6 +7,7 @@ import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +18,7 @@ from exugear.gearbox.sections.loads import LubricantSection, RatingSection
 from exugear.gearbox.units import RPM
 from exugear.gearbox.versions import LIFE
 from exugear.life.bearing_life import BearingLife, bearing_lives
-from exugear.life.dynamic_factors import WITHIN, DynamicFactor
+from exugear.life.dynamic_factors import WITHIN, DynamicFactor, source_hash
 from exugear.life.gear_life import FlankLife, check_strengths, flank_lives, warn_beyond_tables
 from exugear.life.load_spectrum.counted import CountedLoads, count_loads
 from exugear.life.load_spectrum.sources import Progress, section_of
@@ -31,6 +32,7 @@ from exugear.life.static_balance import (
 )
 from exugear.system.bearings.rolling.life import LEAST_RATIO
 from exugear.system.system import Assembly, input_hash
+from exugear.system.tooth_mesh.tables import TableRequest
 from fe_ste.standards.iso6336 import outside_scope
 from fe_ste.tools.display import ReprMixin
 
@@ -260,8 +262,8 @@ def check_keys(gearbox: Gearbox) -> None:
         raise GearboxFileError(*errors)
 
 
-def life_hash(assembly: Assembly, counted: CountedLoads, tables: Mapping[str, str], run: str = "") -> str:
-    """Return the SHA-256 of all input of a rating, with hashes of the inputs of its tables (by pair) and run."""
+def life_hash(assembly: Assembly, counted: CountedLoads, requests: Iterable[TableRequest], folder: Path) -> str:
+    """Return the SHA-256 of all input of a rating: with that of its tables, and of its run or response in a folder."""
     case = assembly.gearbox.content
     content = {
         "method_version": LIFE,
@@ -270,8 +272,8 @@ def life_hash(assembly: Assembly, counted: CountedLoads, tables: Mapping[str, st
         "rating": case.get("rating"),
         "lubricant": case.get("lubricant"),
         "files": {source.name: source.digest for source in counted.sources},
-        "tables": dict(tables),
-        "run": run,
+        "tables": {request.name: request.wanted.hash for request in requests},
+        "run": source_hash(assembly, rating_of(assembly.gearbox), folder),
     }
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 

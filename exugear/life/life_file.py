@@ -16,9 +16,8 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.versions import LIFE
 from exugear.life.bearing_life import BearingLife
-from exugear.life.dynamic_factors import source_hash
 from exugear.life.gear_life import FlankLife
-from exugear.life.life import Life, checked_loads, life_hash, rating_of
+from exugear.life.life import Life, checked_loads, life_hash
 from exugear.life.static_balance import life_requests
 from exugear.results.folder import modes_path
 from exugear.system.statics import BalanceError
@@ -215,9 +214,7 @@ def stored_lives(gearbox: Gearbox, folder: Path, assembled: Callable[[Choice], A
             data = read_life(path)
             assembly = assembled(choice_of(data.attrs))
             counted = checked_loads(gearbox)
-            source = source_hash(assembly, rating_of(gearbox), folder)
-            tables = {request.name: request.wanted.hash for request in life_requests(assembly, counted, folder)}
-            digest = life_hash(assembly, counted, tables, source)
+            digest = life_hash(assembly, counted, life_requests(assembly, counted, folder), folder)
         except (FileError, GearboxFileError, BalanceError, KeyError) as error:
             yield StoredLife(path, None, str(error))
             continue

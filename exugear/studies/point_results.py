@@ -14,7 +14,7 @@ import filelock
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.units import UM
-from exugear.life.dynamic_factors import factors, source_hash
+from exugear.life.dynamic_factors import factors
 from exugear.life.gear_life import pair_stresses
 from exugear.life.life import UNTRUSTED_REACH, check_reach, checked_loads, compute_life, life_hash, rating_of
 from exugear.life.life_file import to_dataset
@@ -325,8 +325,7 @@ class PointResults:
         requests = static if grid else stress_requests(assembly, static, counted, self.folder)
         stresses = {request.name: self.shared.stresses(request, _ignore_progress) for request in requests}
         dynamic = factors(assembly, rating, self.folder, counted.body)
-        tables = {request.name: request.wanted.hash for request in requests}
-        digest = life_hash(assembly, counted, tables, source_hash(assembly, rating, self.folder))
+        digest = life_hash(assembly, counted, requests, self.folder)
         angles = KeptAngles(Store(self.folder / KEPT_ANGLES, digest))
         life = compute_life(assembly, counted, stresses, dynamic, digest, _ignore_progress, angles)
         data = to_dataset(life, assembly.gearbox.name)
