@@ -36,7 +36,7 @@ NOTICED_CHANGE = 1e-2
 """Relative change of the highest peaks with more harmonics above which a warning is given."""
 NOTICED_VARIATION = 1e-3
 """Relative variation of stiffness with the carrier angle above which a warning is given."""
-NOTICED_NEIGHBOURS = 1e-2
+NOTICED_NEIGHBOURS = 0.03
 """Relative change of the vibration by orders that are left out above which a warning is given."""
 NOTICED_SHUTTLING = 0.3
 """Ratio of shuttling moment to transmission error excitation above which a warning is given."""
@@ -265,8 +265,7 @@ def _passing(data: xr.Dataset) -> Iterator[Finding]:
     named = " and ".join(carriers)
     angles = "angles" if several else "angle"
     text = f"stiffness varies with the {angles} of {named}: {count} orders of passing planets and beside mesh orders "
-    text += "are included; those left out change the transmission error and the deflections of the meshes by at most "
-    text += f"{100.0 * left_out:.1g} %"
+    text += f"are included; those left out change mesh orders by at most {100.0 * left_out:.1g} %"
     yield Finding("warning" if left_out > NOTICED_NEIGHBOURS else "note", text, left_out)
     over_angle = data["mode_over_angle"].to_numpy()
     if over_angle.size:

@@ -253,7 +253,8 @@ class SteadyResponse(ReprMixin):
     higher_between: tuple[HigherBetween, ...]
     """By quantity, the peaks that are higher between the computed speeds."""
     neighbours_left_out: float
-    """Largest relative change of transmission error and mesh deflections by the orders left out beside others."""
+    """Largest change of an order of the meshes by the orders left out beside it, relative, see
+    `exugear.steady.balance.neighbours.with_needed_neighbours`."""
     planet_spread: float
     """Largest change of planet bearings' stiffness that made the planets equal, over that stiffness."""
     stiffness_variation: float
@@ -366,7 +367,8 @@ def response_of(
     neglected = 0.0
     if model.waves.neighbours and not model.loses_contact:
         every = model.lines.index
-        judged = judged_speeds(float(even.min()), float(even.max()), [one.speed for one in found])
+        met = [(one.line, one.speed) for one in found]
+        judged = judged_speeds(float(even.min()), float(even.max()), met, operation)
         model, neglected = with_needed_neighbours(model, judged, prepared)
         solver = PointSolver(model, settings.method)
         found = tuple(replace(one, line=int(model.lines.find(every[one.line])[0])) for one in found)
