@@ -36,8 +36,8 @@ NOTICED_CHANGE = 1e-2
 """Relative change of the highest peaks with more harmonics above which a warning is given."""
 NOTICED_VARIATION = 1e-3
 """Relative variation of stiffness with the carrier angle above which a warning is given."""
-NOTICED_NEIGHBOURS = 0.03
-"""Relative change of the vibration by orders that are left out above which a warning is given."""
+NOTICED_NEIGHBOURS = 0.05
+"""Relative change of a mesh order by orders that are left out beside it above which a warning is given."""
 NOTICED_SHUTTLING = 0.3
 """Ratio of shuttling moment to transmission error excitation above which a warning is given."""
 FIRST_RANKS = 20
@@ -265,7 +265,8 @@ def _passing(data: xr.Dataset) -> Iterator[Finding]:
     named = " and ".join(carriers)
     angles = "angles" if several else "angle"
     text = f"stiffness varies with the {angles} of {named}: {count} orders of passing planets and beside mesh orders "
-    text += f"are included; those left out change mesh orders by at most {100.0 * left_out:.1g} %"
+    text += f"are included; those left out change a mesh order by at most {100.0 * left_out:.1g} % of its amplitude, or "
+    text += "of a tenth of the highest order"
     yield Finding("warning" if left_out > NOTICED_NEIGHBOURS else "note", text, left_out)
     over_angle = data["mode_over_angle"].to_numpy()
     if over_angle.size:

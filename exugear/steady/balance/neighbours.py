@@ -19,15 +19,15 @@ from exugear.steady.mean_system.mean_system import Steps
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.processes import each_in_forks
 
-CARRIED = (0.1, 0.05, 0.02, 0.01, 3e-3, 1e-3)
+CARRIED = (0.05, 0.02, 0.01, 3e-3, 1e-3)
 """Shares of the highest line of its order that a line has to have in some quantity at one of the speeds, tried one
 after the other."""
-SMALL = 0.05
+SMALL = 0.1
 """Share of the highest order of a quantity at a speed below which orders are held against this share."""
-CHANGED = 0.02
+CHANGED = 0.05
 """Change of an order by the lines left out, over its highest line, with which a choice is good enough.
 
-Orders of the GRC with everything flexible then change by at most 3 % at other speeds, most by a tenth of that."""
+Of the orders of the GRC with everything flexible, one in a thousand then changes by more than 2 %."""
 EVEN, IN_OPERATION, AT_CROSSINGS = 3, 6, 12
 """Speeds at which lines are judged: some even ones of all and of the range of operation, and the strongest crossing
 with a mode of so many orders."""

@@ -202,14 +202,26 @@ def test_damping_takes_the_power_that_the_meshes_give(solver, response):
     assert given == pytest.approx(taken, rel=1e-4)
 
 
-def test_lines_that_are_left_out_change_the_others_by_what_is_told(solver, response):
-    few, changed = with_needed_neighbours(solver.model, np.array([SPEED]))
-    assert 0.0 < changed < 1e-3
-    assert len(few.lines.orders) < len(solver.model.lines.orders)
-    found = signals(few, parametric_response(few, few.at(SPEED)))[1:, 0]
-    at = solver.model.lines.find(few.lines.index[1:])[0]
-    known = signals(solver.model, response)[at, 0]
-    assert np.linalg.norm(found - known) < 1.01 * changed * np.linalg.norm(known)
+def orders_apart(few, model, speed):
+    """Largest change of an order of the meshes in any quantity, over its amplitude or a tenth of the highest order."""
+    counted = np.flatnonzero(~few.beside_others)[1:]
+    found = signals(few, parametric_response(few, few.at(speed)))[counted]
+    places = model.lines.find(few.lines.index[counted])[0]
+    known = signals(model, parametric_response(model, model.at(speed)))[places]
+    changes = []
+    for quantity in model.quantities:
+        exact = quantity.sizes(known).max(axis=1)
+        apart = np.abs(quantity.sizes(found).max(axis=1) - exact)
+        changes.append((apart / np.maximum(exact, 0.1 * exact.max())).max())
+    return max(changes)
+
+
+def test_lines_that_are_left_out_hardly_change_any_order_of_a_mesh(solver):
+    """At speeds that were judged and others."""
+    few, changed = with_needed_neighbours(solver.model, np.array([7.3, SPEED, 8.7]))
+    assert 0.0 < changed < 0.05
+    assert len(few.lines.orders) < 0.9 * len(solver.model.lines.orders)
+    assert max(orders_apart(few, solver.model, speed) for speed in (SPEED, 7.7, 8.5)) < 0.05
 
 
 @pytest.mark.validation
@@ -326,6 +338,20 @@ def whole(grc, stiffness):
     assembly = assembled(grc, Choice("flexible"), stiffness)
     model = solver_of(assembly, (4.0, 22.5), "parametric", 12, 5).model
     return with_needed_neighbours(model, np.array(TEN_SPEEDS))[0]
+
+
+@pytest.mark.long
+def test_orders_of_the_grc_with_all_bodies_flexible_have_the_neighbours_that_they_need(grc, stiffness):
+    """At speeds in the operating range that were not judged.
+
+    The second order of the last stage hardly deflects the meshes, but shakes bearings at 23.43 rpm second most: without
+    its neighbours it is 2.1 times as high.
+    """
+    model = solver_of(assembled(grc, Choice("flexible"), stiffness), (1.0, 3.0), "parametric", 12).model
+    few, changed = with_needed_neighbours(model, np.array([1.16, 1.6, 2.0, 2.3, 2.6, 2.89]))
+    assert 0.0 < changed < 0.05
+    assert len(few.lines.orders) < 0.5 * len(model.lines.orders)
+    assert max(orders_apart(few, model, rpm * np.pi / 30.0) for rpm in (14.9, 20.28, 23.43, 26.17)) < 0.1
 
 
 @pytest.mark.long
