@@ -16,7 +16,7 @@ RUN = 13
 #: Life of gears and bearings (`exugear.life`, and the root stress of `fe_ste.root_stress`).
 LIFE = 12
 #: Steady-state responses (`exugear.steady`, and all methods that modes use).
-STEADY = 33
+STEADY = 34
 #: Comparisons with measured run-ups (`exugear.steady.evaluation`, `exugear.results.order_tracking`).
 MEASURED = 5
 #: Points of studies (`exugear.studies`: their outputs; the methods that these use have their own versions).

@@ -342,13 +342,13 @@ def whole(grc, stiffness):
 
 @pytest.mark.long
 def test_orders_of_the_grc_with_all_bodies_flexible_have_the_neighbours_that_they_need(grc, stiffness):
-    """At speeds in the operating range that were not judged.
+    """At speeds in the operating range; judged at resonances of other orders, after a run-up and near standstill.
 
     The second order of the last stage hardly deflects the meshes, but shakes bearings at 23.43 rpm second most: without
     its neighbours it is 2.1 times as high.
     """
-    model = solver_of(assembled(grc, Choice("flexible"), stiffness), (1.0, 3.0), "parametric", 12).model
-    few, changed = with_needed_neighbours(model, np.array([1.16, 1.6, 2.0, 2.3, 2.6, 2.89]))
+    model = solver_of(assembled(grc, Choice("flexible"), stiffness), (0.05, 22.4), "parametric", 12).model
+    few, changed = with_needed_neighbours(model, np.array([0.06, 0.78, 1.19, 1.45, 1.93, 2.12, 2.16, 11.2, 22.4]))
     assert 0.0 < changed < 0.05
     assert len(few.lines.orders) < 0.5 * len(model.lines.orders)
     assert max(orders_apart(few, model, rpm * np.pi / 30.0) for rpm in (14.9, 20.28, 23.43, 26.17)) < 0.1
