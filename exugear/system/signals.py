@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 
 AXES = ("x", "y", "z")
 """Entries along the dimension `axis`: the global axes."""
+MESH_ROUND_OFF = 1e-12
+"""Tensile deflection of a mesh up to which it is round-off, m: the deflection of a mesh without load is of the order of
+1e-15 m with either sign, and that of a loaded one of 1e-6 m."""
 
 
 @dataclass(frozen=True)
@@ -177,7 +180,7 @@ SIGNALS = (
         ("mesh",),
         "s",
         "time with tensile mesh force (bilateral mesh models)",
-        formula=lambda layout, rows: layout.values("mesh_dte", rows) < 0.0,
+        formula=lambda layout, rows: layout.values("mesh_dte", rows) < -MESH_ROUND_OFF,
         laws="bilateral",
     ),
     Signal(
