@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 
 AXES = ("x", "y", "z")
 """Entries along the dimension `axis`: the global axes."""
-MESH_ROUND_OFF = 1e-12
-"""Tensile deflection of a mesh up to which it is round-off, m: the deflection of a mesh without load is of the order of
-1e-15 m with either sign, and that of a loaded one of 1e-6 m."""
+LEAST_TENSION = 1e-9
+"""Tensile deflection of a mesh (m) up to which it counts as unloaded. Loaded meshes deflect by micrometres; in a mesh
+without load, round-off of 1e-15 m and inertia forces of hundredths of a newton have either sign."""
 
 
 @dataclass(frozen=True)
@@ -179,8 +179,8 @@ SIGNALS = (
         "tensile_time",
         ("mesh",),
         "s",
-        "time with tensile mesh force (bilateral mesh models)",
-        formula=lambda layout, rows: layout.values("mesh_dte", rows) < -MESH_ROUND_OFF,
+        "time with tensile mesh force (bilateral mesh models), of more than 1 nm of deflection",
+        formula=lambda layout, rows: layout.values("mesh_dte", rows) < -LEAST_TENSION,
         laws="bilateral",
     ),
     Signal(
