@@ -59,7 +59,7 @@ class WatchedProject(Project):
         requests = self.missing_tables()
         self.keep_case()
         for request in requests:
-            note(request.replaces or f"{request.name}: no table in {self.folder}; computing it first")
+            note(request.announcement)
         with time_noted(self.folder, "tables, computed before dynamics") if requests else nullcontext():
             self.computed(requests)
         # Mesh models themselves refuse tables that they cannot use.

@@ -84,6 +84,13 @@ def errors_of_pairs(case: GearboxFile) -> Iterator[str]:
                 yield f"pairs.{name}.{key} = {gear!r}: no such gear; {known}"
 
 
+def errors_of_strengths(case: GearboxFile) -> Iterator[str]:
+    """Yield errors for strengths and roughnesses of unknown gears, which losses would replace by usual values."""
+    for gear in case.rating.gears if case.rating else ():
+        if gear not in case.gears:
+            yield f"rating.gears.{gear}: no such gear; {known_names('gears', case.gears, f'gears.{gear}', gear)}"
+
+
 def errors_of_blanks(case: GearboxFile) -> Iterator[str]:
     """Yield errors for blanks of stepped shafts without a seat, if the inertia follows from the shape.
 
@@ -515,6 +522,7 @@ CHECKS = (
     Check("names of bodies", errors_of_bodies),
     Check("masses", errors_of_mass_properties),
     Check("names of pairs", errors_of_pairs),
+    Check("strengths", errors_of_strengths),
     Check("gears", None, ("names of pairs",)),
     Check("file_stiffness"),
     Check("supports", errors_of_supports),
@@ -552,6 +560,7 @@ ALONE = (
     "names of bodies",
     "masses",
     "names of pairs",
+    "strengths",
     "gears",
     "file_stiffness",
     "supports",

@@ -288,7 +288,10 @@ def bearing_range_warning(gearbox: Gearbox, loads: LoadSummary, variant: str) ->
         return ""
     turned = [family for family, share in light.items() if share < 0.0]
     least = min(light.values())
-    how = f"reverses the load of {', '.join(turned)}" if turned else f"loads {', '.join(light)} with {least:.2g} of it"
+    how = f"reverses the load of {', '.join(turned)}"
+    if not turned:
+        # The least of shares that are not negative may be a negative zero.
+        how = f"loads {', '.join(light)} with {100.0 * abs(least):.2g} % of it"
     return (
         f'bearings are linearised at the static load, but the load case {loads.name} {how}; set model = "iso16281" on '
         "the bearings for displacements and loads there"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -143,6 +143,11 @@ def _rpm(speed: float) -> str:
     return f"{float(f'{abs(speed) / RPM:.3g}'):g} rpm"
 
 
+def _counted(speeds: Sequence[object]) -> str:
+    """Return a number of speeds, with its noun."""
+    return f"{len(speeds)} speed{'s' * (len(speeds) != 1)}"
+
+
 def _balance(data: xr.Dataset) -> Iterator[Finding]:
     """Energy and stability of the steady state."""
     error = float(np.nanmax(np.abs(data["energy_error"])))
@@ -166,7 +171,7 @@ def _speeds(data: xr.Dataset) -> Iterator[Finding]:
         yield Finding("error", f"continuation incomplete: {ended}")
     if missing := json.loads(data.attrs["not_converged"]):
         first = f"{_rpm(missing[0]['speed'])}: {missing[0]['reason']}"
-        text = f"no steady state found at {len(missing)} speeds (blank in the diagrams), first {first}"
+        text = f"no steady state found at {_counted(missing)} (blank in the diagrams), first {first}"
         yield Finding("warning", text, len(missing))
     speed = np.abs(data["speed"].to_numpy())
     if (at := speed[data["loads_at_mean_angles"].to_numpy() == 1]).size:
@@ -185,7 +190,7 @@ def _speeds(data: xr.Dataset) -> Iterator[Finding]:
     remarks = [(speed, str(text)) for speed, text in zip(data["speed"].values, data["remark"].values, strict=True)]
     if said := [(speed, text) for speed, text in remarks if text]:
         first = f"{_rpm(said[0][0])}: {said[0][1]}"
-        yield Finding("warning", f"{len(said)} speeds with warnings, first {first}", len(said))
+        yield Finding("warning", f"{_counted(said)} with warnings, first {first}", len(said))
 
 
 def _between_speeds(data: xr.Dataset) -> Iterator[Finding]:

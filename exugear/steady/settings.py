@@ -55,6 +55,11 @@ class SpeedRange:
             raise SteadyError(f"speeds {self.text}: change sign; compute each sense of rotation separately")
         if self.first == self.last == 0.0:
             raise SteadyError(f"speeds {self.text}: no excitation at standstill; set a speed above 0")
+        if self.first == 0.0 and self.count == 1:
+            raise SteadyError(
+                f"speeds {self.text}: the only speed is the first one, standstill, which has no excitation; set 2 or "
+                "more speeds, or a first one above 0"
+            )
 
     @property
     def text(self) -> str:

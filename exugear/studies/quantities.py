@@ -160,8 +160,21 @@ def misalignments(results: PointResults) -> dict[str, float]:
 
 def load_sharing(results: PointResults, *, meshes: str) -> float:
     """Mesh load factor: the largest force among the planets' meshes over their mean, under the static load."""
-    forces = planet_values(results, meshes, results.static.mesh_force)
-    return float(forces.max() / forces.mean())
+    return _sharing(planet_values(results, meshes, results.static.mesh_force), meshes)
+
+
+def _sharing(forces: Floats, meshes: str) -> float:
+    """Return the largest of the forces among planets over their mean; forces on the opposite flank are negative.
+
+    Raises
+    ------
+    PointError
+        The planets carry no load, but round-off of either sign.
+    """
+    mean = float(forces.mean())
+    if abs(mean) < LEAST_MESH_FORCE:
+        raise PointError(f"meshes {meshes!r} carry no load that the planets could share")
+    return float((forces / mean).max())
 
 
 def planet_values(results: PointResults, family: str, values: Floats) -> Floats:
@@ -179,6 +192,8 @@ def planet_values(results: PointResults, family: str, values: Floats) -> Floats:
     return np.asarray(values[..., chosen], dtype=np.float64)
 
 
+LEAST_MESH_FORCE = 1e-6
+"""Mean force of the meshes of planets, N, below which they carry no load."""
 SETTLING = 0.25
 """Fraction of a run at its beginning that is skipped."""
 OVERALL = "overall_dte"
@@ -222,8 +237,7 @@ def final_speed(results: PointResults) -> float:
 
 def dynamic_load_sharing(results: PointResults, *, meshes: str) -> float:
     """Largest mean force among the planets' meshes over the mean of all, in a run."""
-    forces = planet_values(results, meshes, _settled(results, "mesh_force")).mean(axis=0)
-    return float(forces.max() / forces.mean())
+    return _sharing(planet_values(results, meshes, _settled(results, "mesh_force")).mean(axis=0), meshes)
 
 
 def order_amplitudes(

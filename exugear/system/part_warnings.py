@@ -412,8 +412,9 @@ def pair_margins(spec: PairSpec) -> PairMargins:
     torque = spec.static_torque
     first, second = (gear.tip_thickness / gear.normal_module for gear in (pair.pinion, pair.gear))
     tangent = pair.base_tangent_length
-    on_pinion = pair.pinion_roll_length(pair.gear.tip_roll_length)
-    pinion_tip = pair.pinion.tip_roll_length
+    # Contact ends at the tip form diameter, below a chamfer.
+    on_pinion = pair.pinion_roll_length(pair.gear.tip_form_roll_length)
+    pinion_tip = pair.pinion.tip_form_roll_length
     on_gear = tangent + pinion_tip if pair.gear.internal else tangent - pinion_tip
     return PairMargins(
         form=(_margin(pair.pinion, on_pinion), _margin(pair.gear, on_gear)),
@@ -489,7 +490,7 @@ def backlash_range(gearbox: Gearbox, pair: GearPair) -> tuple[float, float, floa
 def _margin(gear: Gear, roll_length: float) -> float:
     if gear.has_relieved_root:
         return math.nan
-    flank = gear.tip_roll_length - gear.form_roll_length  # negative for a ring, as the numerator is
+    flank = gear.tip_form_roll_length - gear.form_roll_length  # negative for a ring, as the numerator is
     return (roll_length - gear.form_roll_length) / flank
 
 
@@ -503,11 +504,16 @@ def pair_warnings(gearbox: Gearbox) -> Iterator[str]:
         gears = (spec.pair.pinion, spec.pair.gear)
         for gear, mate, margin in zip(gears, gears[::-1], margins.form, strict=True):
             if margin < LEAST_FORM_MARGIN and spec.table:
-                key = f"gears.{mate.name}.tip_diameter_mm = {2e3 * mate.tip_radius:.6g}"
+                # A chamfer moves with the tip; a stated form diameter does not.
+                is_stated = gearbox.case.gears[mate.name].tip_form_diameter_mm is not None
+                key = "tip_form_diameter_mm" if is_stated else "tip_diameter_mm"
+                chamfer = 0.0 if is_stated else mate.tip_radius - mate.tip_form_radius
+                present = 2e3 * (mate.tip_form_radius + chamfer)
+                proposed = 1e3 * _clear_form_diameter(spec.pair, mate) + 2e3 * chamfer
                 yield (
-                    f"{key}: the start of active profile is {100 * margin:.2g} % of the profile length from the root "
-                    f"form diameter of {gear.name}, where contact under load is truncated; the table of {name} lists "
-                    f"the truncated load; {1e3 * _clear_tip_diameter(spec.pair, mate):.6g} leaves "
+                    f"gears.{mate.name}.{key} = {present:.6g}: the start of active profile is {100 * margin:.2g} % of "
+                    f"the profile length from the root form diameter of {gear.name}, where contact under load is "
+                    f"truncated; the table of {name} lists the truncated load; {proposed:.6g} leaves "
                     f"{100 * PROPOSED_MARGIN:g} %"
                 )
         pair = spec.pair
@@ -533,10 +539,10 @@ def pair_warnings(gearbox: Gearbox) -> Iterator[str]:
             )
 
 
-def _clear_tip_diameter(pair: GearPair, mate: Gear) -> float:
-    """Tip diameter of a gear, m, that leaves the proposed margin on the other one of its pair."""
+def _clear_form_diameter(pair: GearPair, mate: Gear) -> float:
+    """Tip form diameter of a gear, m, that leaves the proposed margin on the other one of its pair."""
     other = pair.pinion if mate is pair.gear else pair.gear
-    on_other = other.form_roll_length + PROPOSED_MARGIN * (other.tip_roll_length - other.form_roll_length)
+    on_other = other.form_roll_length + PROPOSED_MARGIN * (other.tip_form_roll_length - other.form_roll_length)
     if mate is pair.pinion:
         roll = pair.pinion_roll_length(on_other)
     else:

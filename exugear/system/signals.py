@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 
 AXES = ("x", "y", "z")
 """Entries along the dimension `axis`: the global axes."""
+LEAST_TENSION = 1e-9
+"""Tensile deflection of a mesh (m) up to which it counts as unloaded. Loaded meshes deflect by micrometres; in a mesh
+without load, round-off of 1e-15 m and inertia forces of hundredths of a newton have either sign."""
 
 
 @dataclass(frozen=True)
@@ -176,8 +179,8 @@ SIGNALS = (
         "tensile_time",
         ("mesh",),
         "s",
-        "time with tensile mesh force (bilateral mesh models)",
-        formula=lambda layout, rows: layout.values("mesh_dte", rows) < 0.0,
+        "time with tensile mesh force (bilateral mesh models), of more than 1 nm of deflection",
+        formula=lambda layout, rows: layout.values("mesh_dte", rows) < -LEAST_TENSION,
         laws="bilateral",
     ),
     Signal(

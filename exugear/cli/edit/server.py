@@ -180,8 +180,10 @@ class Handler(BaseHTTPRequestHandler):
         server = self.server
         content = self._content()
         if path == "state":
-            text, tab, geometry = (str(content.get(key, "")) for key in ("text", "tab", "geometry"))
+            text = _text(content)
+            tab, geometry = (str(content.get(key, "")) for key in ("tab", "geometry"))
             server.file.latest = text
+            _check_characters(text)
             # The rest is not computed for a page that has gone.
             steps = server.analyst.steps(text, tab, geometry)
             with closing(steps):
@@ -190,8 +192,10 @@ class Handler(BaseHTTPRequestHandler):
                     self.wfile.write(json.dumps(step).encode() + b"\n")
                     self.wfile.flush()
         elif path == "save":
+            text = _text(content)
+            _check_characters(text)
             try:
-                server.file.save(str(content.get("text", "")), str(content.get("digest", "")))
+                server.file.save(text, str(content.get("digest", "")))
             except OSError as error:
                 reason = f"{error.filename or server.file.case}: {error.strerror or error}"
                 raise RefusedError(
@@ -199,7 +203,7 @@ class Handler(BaseHTTPRequestHandler):
                     f"The file was not saved and has its earlier content ({reason}). The text is still in this page.",
                 ) from error
             self._send_json(server.file.told())
-        elif path == "start" and content.get("kind") in KINDS:
+        elif path == "start" and str(content.get("kind")) in KINDS:
             text = server.file.text()
             if server.analyst.check(text).gearbox is None:
                 raise RefusedError(HTTPStatus.CONFLICT, "the saved file has errors; correct them and save it first")
@@ -244,3 +248,34 @@ class Handler(BaseHTTPRequestHandler):
 
     def log_message(self, format: str, *args: Any) -> None:
         """Print nothing."""
+
+
+def _text(content: Mapping[str, Any]) -> str:
+    """Return the text of a gearbox file in the content of a request.
+
+    Raises
+    ------
+    RefusedError
+        There is no text.
+    """
+    text = content.get("text")
+    if not isinstance(text, str):
+        raise RefusedError(HTTPStatus.BAD_REQUEST, "content has no text")
+    return text
+
+
+def _check_characters(text: str) -> None:
+    """Refuse a text that UTF-8 cannot represent, since no command could read its file.
+
+    Raises
+    ------
+    RefusedError
+        Half of a pair of surrogates, which a browser can send.
+    """
+    try:
+        text.encode()
+    except UnicodeEncodeError as error:
+        line = text.count("\n", 0, error.start) + 1
+        raise RefusedError(
+            HTTPStatus.BAD_REQUEST, f"line {line} has a character that no file can contain; delete it"
+        ) from None

@@ -151,7 +151,7 @@ def _requested_tables(
         if request.stored:
             continue
         if request.replaces:
-            note(request.replaces)
+            note(request.announcement)
         if len(request.wanted.misalignment) > 1:
             ranges = request.wanted.axes().ranges()
             note(f"{request.name}: grid over {', '.join(f'{axis} {values}' for axis, values in ranges.items())}")

@@ -47,6 +47,9 @@ MOST_STEPS = 4
 """Steps to either side at most."""
 ROUND_NUMBERS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 
+RECOMPUTE = "; recompute it"
+"""Advice at the end of the reasons why a table is not usable."""
+
 
 @dataclass(frozen=True)
 class GridAxes:
@@ -139,6 +142,13 @@ class TableRequest:
     """The table in the file, if it was computed from exactly this input."""
     replaces: str = ""
     """Reason why an existing file is not usable; empty if there is none or it is usable."""
+
+    @property
+    def announcement(self) -> str:
+        """Sentence that the table is computed now, with the reason; the advice of the reason is for other callers."""
+        if not self.replaces:
+            return f"{self.name}: no table in {self.path.parent.parent}; computing it first"
+        return f"{self.replaces.removesuffix(RECOMPUTE)}; computing it again"
 
     @property
     def states(self) -> int:
@@ -299,9 +309,12 @@ def fitting_table(
     wanted = wanted_table(gearbox, name, table.dataset.sizes["pmc"], grid)
     fits = _with_named_axes(gearbox, table, wanted) if grid else _holds(table, wanted)
     if not (table.input_hash == wanted.hash or fits):
-        raise TableError(f"{path}: was computed from another input; recompute it")
+        static = wanted_table(gearbox, name, wanted.positions)
+        if grid and (table.input_hash == static.hash or _holds(table, static)):
+            raise TableError(f"{path}: does not vary load, centre distance and misalignment as required{RECOMPUTE}")
+        raise TableError(f"{path}: was computed from another input{RECOMPUTE}")
     if grid and axes is not None and not reaches(table, wanted_table(gearbox, name, wanted.positions, grid, axes)):
-        raise TableError(f"{path}: its axes end too close to the static state; recompute it")
+        raise TableError(f"{path}: its axes end too close to the static state{RECOMPUTE}")
     return table
 
 

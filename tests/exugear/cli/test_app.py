@@ -197,6 +197,20 @@ def test_a_damaged_table_is_computed_again(spur_case, tmp_path):
     (request,) = requested_tables(Gearbox.from_toml(spur_case), tmp_path)
     assert request.stored is None
     assert "spur.nc" in request.replaces
+    assert request.announcement.endswith("; computing it again")
+
+
+@pytest.mark.validation
+def test_what_is_computed_again_is_not_asked_of_the_reader(computed):
+    case, out, _ = computed
+    gearbox = Gearbox.from_toml(case)
+    (fewer,) = requested_tables(gearbox, out, positions=9)
+    assert fewer.announcement.endswith("with other positions; computing it again")
+    (wider,) = requested_tables(gearbox, out, positions=8, grid=True)
+    assert wider.replaces.endswith(": does not vary load, centre distance and misalignment as required; recompute it")
+    assert wider.announcement.endswith("as required; computing it again")
+    (other,) = requested_tables(gearbox.varied({"static_load.torques_N_m.shaft_1": 90.0}), out)
+    assert other.announcement.endswith("spur.nc: was computed from another input; computing it again")
 
 
 @pytest.mark.validation

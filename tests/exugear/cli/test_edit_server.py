@@ -254,10 +254,27 @@ def test_work_that_fails_shows_the_message_of_the_command(server, capsys):
 
 
 def test_work_of_an_unknown_kind_or_of_a_file_with_errors_is_refused(server):
-    assert ask(server, own(server, "start"), {"kind": "rm"})[0] == 404
+    for kind in ("rm", ["tables"], {}, None):
+        assert ask(server, own(server, "start"), {"kind": kind})[0] == 404
     server.file.case.write_text(PAIR.replace("teeth = 24", "teeth = 0"))
     status, content, _ = ask(server, own(server, "start"), {"kind": "tables"})
     assert (status, "correct them" in json.loads(content)["error"]) == (409, True)
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        ({}, "content has no text"),
+        ({"text": None}, "content has no text"),
+        ({"text": 5}, "content has no text"),
+        ({"text": "a = 1\n# \ud800\n"}, "line 2 has a character that no file can contain; delete it"),
+    ],
+)
+def test_what_is_no_text_of_a_file_does_not_replace_the_file(server, content, reason):
+    for path in ("save", "state"):
+        status, answer, _ = ask(server, own(server, path), {**content, "digest": digest_of(PAIR)})
+        assert (status, json.loads(answer)["error"]) == (400, reason)
+    assert server.file.case.read_text() == PAIR
 
 
 def test_line_ends_of_the_file_are_kept(tmp_path):

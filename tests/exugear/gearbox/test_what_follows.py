@@ -212,6 +212,19 @@ def test_teeth_that_do_not_fit_the_centre_distance_are_told_with_the_numbers() -
         )
 
 
+def test_a_strength_of_an_unknown_gear_is_refused() -> None:
+    """Losses would otherwise take usual roughnesses for the gear that the strength is meant for."""
+    strength = (
+        "sigma_H_lim_MPa = 1500.0, sigma_F_lim_MPa = 500.0, roughness_Rz_um = 4.8, root_factor = 0.95, "
+        'curve = "case_hardened"'
+    )
+    with pytest.raises(GearboxFileError) as caught:
+        gearbox_of(("[pairs]", f"[rating]\ndynamic_factor = 1.1\ngears.whel = {{ {strength} }}\n\n[pairs]"))
+    assert caught.value.errors == (
+        "case.toml: rating.gears.whel: no such gear; did you mean 'wheel'? gears are pinion, wheel",
+    )
+
+
 def test_an_unknown_gear_of_a_pair_is_told_instead_of_what_follows_from_it() -> None:
     with pytest.raises(GearboxFileError) as caught:
         gearbox_of(

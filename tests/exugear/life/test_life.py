@@ -286,7 +286,7 @@ def test_an_extreme_load_counts_for_static_safety_alone(tmp_path, first, stresse
     ("change", "message"),
     [
         (lambda content: content.pop("rating"), "rating: this section is missing"),
-        (lambda content: content["rating"]["gears"].update(sun={**STRENGTH}), "no gear of that name in a mesh"),
+        (lambda content: content["rating"]["gears"].update(sun={**STRENGTH}), "rating.gears.sun: no such gear"),
         (
             lambda content: content["loads"].update(body="nobody"),
             "does not rotate",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from typing import Any
 
@@ -263,6 +264,19 @@ def test_speeds_at_which_loads_do_not_settle_are_told():
     assert not data["loads_at_mean_angles"].any()
     assert data["energy_error"].max() < 1e-6
     assert not any("mean speed" in own.text for own in response_findings(data))
+
+
+@pytest.mark.parametrize(("count", "number"), [(1, "1 speed"), (2, "2 speeds")])
+def test_a_single_speed_with_a_remark_or_without_a_state_is_told_in_the_singular(count, number):
+    assembly, _ = pair({"orders": [1], "torque_N_m": [1e-3]})
+    data = to_dataset(
+        response_of(assembly, SteadySettings(SpeedRange(390.0, 400.0, 2), "nonlinear", at_resonances=False))
+    )
+    data["remark"][:] = ["unstable"] * count + [""] * (2 - count)
+    data.attrs["not_converged"] = json.dumps([{"speed": 395.0, "reason": "no solution"}] * count)
+    texts = [own.text for own in response_findings(data)]
+    assert f"no steady state found at {number} (blank in the diagrams), first 3770 rpm: no solution" in texts
+    assert f"{number} with warnings, first 3720 rpm: unstable" in texts
 
 
 @pytest.mark.validation

@@ -152,6 +152,7 @@ def test_a_planet_feels_waves_at_the_line_plus_and_minus_its_carrier(assembly, t
         ("0:1:2:3", "must be FIRST:LAST:COUNT"),
         ("-5:5:3", ": change sign; compute each sense of rotation separately"),
         ("0:0:3", ": no excitation at standstill; set a speed above 0"),
+        ("0:300:1", ": the only speed is the first one, standstill, which has no excitation; set 2 or more speeds"),
         ("0:nan:3", "must be finite"),
         ("0:10:0", "the count must be from 1"),
     ],

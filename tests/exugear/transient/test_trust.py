@@ -106,6 +106,14 @@ def test_teeth_that_pull_for_the_whole_run_end_with_code_1_and_a_red_box_in_the_
     assert "NO, see top of page" in page and '<section id="ranking"' in page  # shown all the same
 
 
+def test_the_sign_of_round_off_in_an_unloaded_mesh_is_no_tensile_force(tmp_path):
+    case = written(tmp_path, "{ shaft_1 = 0.0, shaft_2 = 0.0 }, start_speed_rpm = 977.0", 0.1)
+    outcome = exugear("run", case, "--json")
+    assert outcome.exit_code == 0, outcome.stderr
+    summary = json.loads(outcome.stdout)
+    assert summary["longest_tensile_time_s"] == 0.0 and summary["valid"] is True
+
+
 def test_absurd_shares_are_told_without_exponents(tmp_path):
     """A torque in N mm: teeth that deflect by many times their height."""
     outcome = exugear("run", written(tmp_path, "{ shaft_1 = 100e6, shaft_2 = 150e6 }"))

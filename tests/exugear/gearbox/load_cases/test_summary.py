@@ -173,7 +173,8 @@ def test_planets_count_with_their_orbits(grc: Gearbox) -> None:
     ("torques", "said"),
     [
         ({"carrier": 240e3, "hss": -2945.1}, ""),
-        ({"carrier": 40e3, "hss": -490.0}, "loads sun_planet, ring_planet, intermediate, high_speed with 0.17 of it"),
+        ({"carrier": 40e3, "hss": -490.0}, "loads sun_planet, ring_planet, intermediate, high_speed with 17 % of it"),
+        ({"carrier": 0.0, "hss": 0.0}, "loads sun_planet, ring_planet, intermediate, high_speed with 0 % of it"),
         ({"carrier": -240e3, "hss": 2945.1}, "reverses the load of sun_planet, ring_planet, intermediate, high_speed"),
     ],
 )

@@ -60,6 +60,24 @@ def test_a_small_margin_foretells_contact_at_the_form_circle_and_the_proposal_me
     assert at_form_circle(mended) == 0
 
 
+def test_a_chamfer_or_form_diameter_ends_contact_for_the_margin_and_its_proposal() -> None:
+    """A chamfered tip touches the mating root where one that is shorter by the chamfer does."""
+    tip = 2e3 * spur(0.9).gears["large"].tip_radius
+    (margin, _), (shorter, _) = (
+        pair_margins(spur(0.9, **large).pairs["helical"]).form
+        for large in ({"tip_chamfer_mm": 0.02}, {"tip_diameter_mm": tip - 0.04})
+    )
+    assert margin == pytest.approx(shorter, rel=1e-9)
+    ends = {"tip_chamfer_mm": 0.02}, {"tip_form_diameter_mm": tip - 0.04}
+    for end, key in zip(ends, ("tip_diameter_mm", "tip_form_diameter_mm"), strict=True):
+        (doubt,) = (line for line in pair_warnings(spur(0.9, **end)) if "% of the profile length from" in line)
+        told = re.match(rf"gears\.large\.{key} = .*; (\d+\.\d+) leaves 2\.5 %", doubt)
+        assert told is not None
+        mended = spur(0.9, **{**end, key: float(told[1])})
+        assert pair_margins(mended.pairs["helical"]).form[0] == pytest.approx(PROPOSED_MARGIN, abs=1e-4)
+        assert not list(pair_warnings(mended))
+
+
 def test_a_pressure_that_no_steel_bears_is_a_warning() -> None:
     """By Hertz it grows as the root of the torque: 3 GPa at the torque that gives it, and 97 GPa at (97/3)^2 times."""
     content = pair(helix_deg=0.0)
