@@ -148,7 +148,7 @@ def test_a_full_disk_ends_each_verb_with_a_sentence(case: Path, small_disk: Path
                     break
     refused = exugear("run", case, "--variant", "rigid", "--mesh-model", "iso6336", "--duration", 0.1, "--out", out)
     assert refused.exit_code == 2
-    assert f"{out} has 0 GB free" in refused.stderr
+    assert f"{out} has 0 GB free; free some space or use another results folder" in refused.stderr
     verbs = [
         ("modes", case, "--variant", "bushing", "--mesh-model", "iso6336", "--out", out),
         ("view", case, "--variant", "rigid", "--mesh-model", "iso6336", "--out", out),
