@@ -19,9 +19,12 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from exugear.gearbox.parts import node_position
+from exugear.gearbox.units import MM
 from exugear.gearbox.variant import VariantError
 from exugear.life.load_spectrum.counted import CountedLoads
 from exugear.life.load_spectrum.counting import LoadPoints
+from exugear.system.kernels.coordinates import BODY_SIZE
 from exugear.system.kernels.meshes import FORCE, OUTSIDE
 from exugear.system.operating_points import contact_places
 from exugear.system.statics import BalanceError, locked_equilibrium, rolled_coordinates, static_state
@@ -279,12 +282,35 @@ def _wrenches(assembly: Assembly, body: str, hub: Floats) -> list[Floats | None]
             f"loads on {body}: rotations only in the variant {assembly.variant}, so rotor forces and moments cannot "
             "act on it; set a body on bearings, or use --variant bushing or flexible"
         )
+    place = _hub_position(assembly, body)
     found: list[Floats | None] = []
-    for place, size in zip(coordinate, hub, strict=True):
-        wrench = np.zeros(assembly.size)
-        wrench[place] = size
-        found.append(wrench if size else None)
+    for component, size in enumerate(hub):
+        wrench = np.zeros(BODY_SIZE)
+        wrench[component] = size
+        found.append(assembly.wrench_on(body, place, wrench) if size else None)
     return found
+
+
+def _hub_position(assembly: Assembly, body: str) -> tuple[float, float, float] | None:
+    """Return the position (m) of rotor loads that the gearbox file states."""
+    loads = assembly.gearbox.case.loads
+    if loads is None or loads.hub_z_mm is None:
+        return None
+    return (*assembly.gearbox.named_bodies[body].axis, MM * loads.hub_z_mm)
+
+
+def hub_position_in_words(assembly: Assembly, body: str) -> str:
+    """Describe where rotor loads act on their body."""
+    if position := _hub_position(assembly, body):
+        return f"at z = {position[2] / MM:g} mm"
+    elastic = assembly.elastic_bodies.get(body)
+    if elastic is not None:
+        place = next(seat for seat in elastic.reduced.seats if seat.name == elastic.main_seat).position[2]
+        reason = "its main seat"
+    else:
+        place = node_position(next(own for own in assembly.bodies if own.name == body))[2]
+        reason = "its centre of mass"
+    return f"at z = {place / MM:.4g} mm, {reason}; set loads.hub_z_mm if they act elsewhere"
 
 
 def _response(parts: Sequence[Floats], sizes: Floats) -> BalanceResponse:
