@@ -27,6 +27,7 @@ from exugear.life.static_balance import (
     AngleStore,
     StaticBalance,
     acting_loads,
+    hub_position_in_words,
     static_balance,
     torque_reaches,
 )
@@ -332,6 +333,7 @@ def compute_life(
         shortfalls=tuple(shortfalls(rating, flanks, bearings, float(acting.points.hours.sum()))),
         reliefs=tuple(needs_of_relief(gearbox, flanks)),
         assumptions=(
+            _hub_in_words(assembly, counted, acting),
             *_assumptions(rating, counted, acting, balance, stresses, dynamic, gearbox.case.lubricant),
             *([SYMMETRIC] if any(back for _, back in torque_reaches(assembly, counted).values()) else []),
             *(f"K_gamma of {family} = {value:.3f}, included in the mesh forces" for family, value in told.items()),
@@ -362,6 +364,16 @@ def _unrated(assembly: Assembly, counted: CountedLoads, stresses: Mapping[str, M
     return [*lines, *NOT_RATED]
 
 
+def _hub_in_words(assembly: Assembly, counted: CountedLoads, acting: ActingLoads) -> str:
+    if not acting.hub_sizes.any():
+        return "torque only: no rotor forces or moments"
+    points = f"in {len(counted.points.torque)} points; " if counted.points.other.any() else "of extreme sources; "
+    return (
+        f"rotor forces and moments on {counted.body} {points}their effect is linear at each torque; they act "
+        + hub_position_in_words(assembly, counted.body)
+    )
+
+
 def _assumptions(
     rating: RatingSection,
     counted: CountedLoads,
@@ -373,13 +385,8 @@ def _assumptions(
 ) -> list[str]:
     count = len(balance.torque)
     turns = len(balance.angle)
-    hub = "torque only: no rotor forces or moments"
-    if counted.points.other.any():
-        hub = f"rotor forces and moments on {counted.body} in {len(counted.points.torque)} points; their effect is "
-        hub += "linear at each torque"
     aligned = ", ".join(name for name, stress in stresses.items() if len(stress.misalignment) < 2)
     lines = [
-        hub,
         f"static balance at {count} torque{'s' * (count > 1)} and {turns} carrier angle{'s' * (turns > 1)}, "
         + ("proportional to torque" if balance.linear else "forces interpolated linearly over torque"),
         _dynamic_in_words(rating, dynamic, acting) + "; none on bearings",

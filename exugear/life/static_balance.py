@@ -19,9 +19,12 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from exugear.gearbox.parts import node_position
+from exugear.gearbox.units import MM
 from exugear.gearbox.variant import VariantError
 from exugear.life.load_spectrum.counted import CountedLoads
 from exugear.life.load_spectrum.counting import LoadPoints
+from exugear.system.kernels.coordinates import BODY_SIZE
 from exugear.system.kernels.meshes import FORCE, OUTSIDE
 from exugear.system.operating_points import contact_places
 from exugear.system.statics import BalanceError, locked_equilibrium, rolled_coordinates, static_state
@@ -71,17 +74,36 @@ class StaticBalance(ReprMixin, line=": {torque!n} torques, {angle!n} angles, lin
     outside: tuple[str, ...] = ()
     """Meshes whose load, centre distance or misalignment is outside the range of their table in any state, where it is
     extrapolated linearly."""
+    loaded_at_rest: bool = False
+    """Whether weight or constant forces act, which load meshes and bearings without torque as well."""
 
     def at(self, response: BalanceResponse, torque: Floats, hub: Floats | None = None) -> Floats:
         """Return the values of a response at torques (n,) and rotor loads (n, 5): (n, a, ...).
 
-        Values are interpolated linearly between solved torques of the same sign.
+        Values per torque are interpolated linearly between solved torques of the same sign. Loads of weight and of
+        constant forces are not proportional to torque and are left out of them: values without torque, extrapolated
+        from the two smallest torques of that sign.
         """
-        found = self._interpolate_torque(response.values / _like(self.torque, response.values), torque)
+        rest = self._without_torque(response.values)
+        per_torque = (response.values - rest) / _like(self.torque, response.values)
+        found = self._interpolate_torque(per_torque, torque)
         found *= _like(torque, found)
+        if self.loaded_at_rest:
+            found += self._interpolate_torque(rest, torque)
         if hub is not None and response.by_hub is not None and hub.any():
             slopes = self._interpolate_torque(response.by_hub, torque)
             found += np.einsum("nh,nh...->n...", hub, slopes)
+        return found
+
+    def _without_torque(self, values: Floats) -> Floats:
+        """Extrapolate values (t, ...) of each sign of the torque to zero torque: (t, ...)."""
+        found = np.zeros_like(values)
+        for sign in (1.0, -1.0) if self.loaded_at_rest else ():
+            own = np.flatnonzero(np.sign(self.torque) == sign)
+            if own.size:
+                first, second = own[np.argsort(np.abs(self.torque[own]))[:2]]
+                slope = (values[second] - values[first]) / (self.torque[second] - self.torque[first])
+                found[own] = values[first] - self.torque[first] * slope
         return found
 
     def _interpolate_torque(self, values: Floats, torque: Floats) -> Floats:
@@ -203,7 +225,8 @@ def static_balance(
     force, misalignment, load, tilt = (_response([states[key] for states in found], sizes) for key in range(4))
     left = np.any([states.outside for states in found], axis=(0, 1, 2))
     outside = tuple(np.array(assembly.mesh_names)[left].tolist())
-    return StaticBalance(solved, turns, force, misalignment, load, tilt, linear, outside)
+    at_rest = _loaded_at_rest(assembly)
+    return StaticBalance(solved, turns, force, misalignment, load, tilt, linear, outside, at_rest)
 
 
 def _solve_angle(
@@ -259,12 +282,35 @@ def _wrenches(assembly: Assembly, body: str, hub: Floats) -> list[Floats | None]
             f"loads on {body}: rotations only in the variant {assembly.variant}, so rotor forces and moments cannot "
             "act on it; set a body on bearings, or use --variant bushing or flexible"
         )
+    place = _hub_position(assembly, body)
     found: list[Floats | None] = []
-    for place, size in zip(coordinate, hub, strict=True):
-        wrench = np.zeros(assembly.size)
-        wrench[place] = size
-        found.append(wrench if size else None)
+    for component, size in enumerate(hub):
+        wrench = np.zeros(BODY_SIZE)
+        wrench[component] = size
+        found.append(assembly.wrench_on(body, place, wrench) if size else None)
     return found
+
+
+def _hub_position(assembly: Assembly, body: str) -> tuple[float, float, float] | None:
+    """Return the position (m) of rotor loads that the gearbox file states."""
+    loads = assembly.gearbox.case.loads
+    if loads is None or loads.hub_z_mm is None:
+        return None
+    return (*assembly.gearbox.named_bodies[body].axis, MM * loads.hub_z_mm)
+
+
+def hub_position_in_words(assembly: Assembly, body: str) -> str:
+    """Describe where rotor loads act on their body."""
+    if position := _hub_position(assembly, body):
+        return f"at z = {position[2] / MM:g} mm"
+    elastic = assembly.elastic_bodies.get(body)
+    if elastic is not None:
+        place = next(seat for seat in elastic.reduced.seats if seat.name == elastic.main_seat).position[2]
+        reason = "its main seat"
+    else:
+        place = node_position(next(own for own in assembly.bodies if own.name == body))[2]
+        reason = "its centre of mass"
+    return f"at z = {place / MM:.4g} mm, {reason}; set loads.hub_z_mm if they act elsewhere"
 
 
 def _response(parts: Sequence[Floats], sizes: Floats) -> BalanceResponse:
@@ -282,11 +328,14 @@ def is_linear(assembly: Assembly) -> bool:
 
     Constant forces on bodies exclude proportionality, as weight does.
     """
-    constant = any(assembly.gearbox.case.gravity.acceleration_m_per_s2) or bool(assembly.gearbox.forces)
     through_points = bool(assembly.connectors.point_load.any())
     curved = any(element.is_curved or element.bears_beside for element in assembly.elements)
     not_linear = assembly.at_rest.has_rows or through_points or curved or LAWS[assembly.mesh_model].loses_contact
-    return not (not_linear or constant)
+    return not (not_linear or _loaded_at_rest(assembly))
+
+
+def _loaded_at_rest(assembly: Assembly) -> bool:
+    return any(assembly.gearbox.case.gravity.acceleration_m_per_s2) or bool(assembly.gearbox.forces)
 
 
 def _torques(torques: Floats, linear: bool) -> Floats:

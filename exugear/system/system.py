@@ -368,6 +368,16 @@ class Assembly(ReprMixin):
             table=np.array(rows, dtype=np.float64).reshape(-1, 3),
         )
 
+    def wrench_on(self, body: str, position: tuple[float, float, float] | None, wrench: Floats) -> Floats:
+        """Generalized forces (size,) of a force and moment (6,), N and N m, on a body at a place (m).
+
+        Without a place they act at the node of the body, of a flexible body at its main seat.
+        """
+        found = np.zeros(self.size)
+        index, values = self._entries("", body, position, wrench.astype(np.complex128))
+        found[index] = values.real
+        return found
+
     def _entries(
         self, name: str, body: str, position: tuple[float, float, float] | None, wrench: Complexes
     ) -> tuple[Integers, Complexes]:

@@ -68,7 +68,7 @@ def check_duration(
     total, key = _span(gearbox, case, duration)
     if not math.isfinite(total):
         raise GearboxFileError(f"{key} = {total:g}: set a finite number of seconds")
-    least = (TAPS_PER_FACTOR + LEAST_SAMPLES) / sample_rate
+    least = _shortest(sample_rate)
     if total < least:
         raise GearboxFileError(
             f"{key} = {total:g}: too short for a spectrum (filtering removes {TAPS_PER_FACTOR / sample_rate:.3g} s at "
@@ -91,10 +91,17 @@ def check_disk(
     needed = total * sample_rate * sample_bytes
     free = shutil.disk_usage(there).free
     if needed > free:
+        fitting = free / (sample_rate * sample_bytes)
+        shorter = f"set at most {fitting:.3g} s, or " if fitting > _shortest(sample_rate) else ""
         raise GearboxFileError(
-            f"{key} = {total:g}: {total * sample_rate:.3g} samples require {1e-9 * needed:.3g} GB, and {there} has "
-            f"{1e-9 * free:.3g} GB free; set at most {free / (sample_rate * sample_bytes):.3g} s"
+            f"{key} = {total:g}: the results require {1e-9 * needed:.3g} GB, and {there} has {1e-9 * free:.3g} GB "
+            f"free; {shorter}free some space or use another results folder"
         )
+
+
+def _shortest(sample_rate: float) -> float:
+    """Return the shortest simulated time (s) of which a spectrum can be computed."""
+    return (TAPS_PER_FACTOR + LEAST_SAMPLES) / sample_rate
 
 
 def sample_bytes(

@@ -110,6 +110,13 @@ class RunStart:
     """Whether the state is that of a run that was stopped, which is in the file already."""
 
 
+_OTHER_INPUT = {
+    "input_hash": "was run with other input: the gearbox file or its tables have changed since",
+    "method_version": "was run by another version of exugear",
+}
+"""Reasons against resuming a run where the two values of an attribute say nothing to the user."""
+
+
 def prepare_start(plan: RunPlan, resume: bool) -> RunStart:
     """Find the state to start from and open the pieces.
 
@@ -139,9 +146,8 @@ def prepare_start(plan: RunPlan, resume: bool) -> RunStart:
         for key, value in plan.attributes().items():
             kept = pieces.attributes.get(key, "element" if key == "mesh_route" else None)  # earlier runs had no other
             if key not in ("complete", "solver", *EXPECTATIONS) and kept != value:
-                raise RunError(
-                    f"{plan.partial_path}: was run with {key} = {kept}, not {value}; run it again without --resume"
-                )
+                other = _OTHER_INPUT.get(key, f"was run with {key} = {kept}, not {value}")
+                raise RunError(f"{plan.partial_path}: {other}; run it again without --resume")
         pieces.note("duration", plan.duration)
         state = pieces.last_checkpoint()
         judge.figures = state.judgement

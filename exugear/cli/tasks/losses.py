@@ -64,9 +64,21 @@ def losses(project: WatchedProject, speed: float | None, efficiency_map: bool, a
         ),
         summary=summary,
         tables=_tables(static_load_in_words(gearbox), summary),
-        findings=list(_findings(summary)),
+        findings=[*_findings(summary), *_driven_backwards(gearbox, chosen)],
         remarks=[NOT_INCLUDED],
     ).show(as_json, whole)
+
+
+def _driven_backwards(gearbox: Gearbox, speed: float) -> Iterator[Finding]:
+    """Yield a warning if the input takes power: the rated speed has no sign and may belong to the other sense."""
+    source = gearbox.case.overall.input
+    torque = gearbox.case.static_load.torques_N_m.get(source, 0.0)
+    if torque * speed < 0.0:
+        yield Finding(
+            "warning",
+            f"torque and speed of {source} have opposite signs: it takes power instead of supplying it; if the gearbox "
+            f"turns in the other sense, use --speed {significant(-speed / RPM)}",
+        )
 
 
 def _duties(gearbox: Gearbox) -> Any:

@@ -125,6 +125,9 @@ class LoadsSection(Section):
     """Number of torque bins for each sign, from zero to the maximum."""
     bin_value: Literal["mean", "upper"] = "mean"
     """Torque that represents a bin: the mean over its revolutions, or its upper edge, which is conservative."""
+    hub_z_mm: q.PlaceMm | None = None
+    """Position along the axis of the body at which hub forces and moments act. By default it is the centre of mass of a
+    rigid body and the main seat of a flexible one."""
     wind: WindSection | None = None
     """Wind distribution of the site, for sources with a wind channel."""
     sources: Annotated[Entries[SourceSection], Field(min_length=1)]
@@ -137,6 +140,15 @@ class LoadsSection(Section):
             raise ValueError(f"sources.{asked[0]}.wind requires the section [loads.wind] with mean_m_per_s")
         if self.wind is not None and not asked:
             raise ValueError("wind: no source has a channel of the wind speed; set wind = ... in a source")
+        return self
+
+    @model_validator(mode="after")
+    def _hub(self) -> LoadsSection:
+        with_hub = any(source.hub_forces or source.hub_moments for source in self.sources.values())
+        if self.hub_z_mm is not None and not with_hub:
+            raise ValueError(
+                f"hub_z_mm = {self.hub_z_mm:g}: no source has hub loads; set hub_forces or hub_moments in a source"
+            )
         return self
 
     @model_validator(mode="after")

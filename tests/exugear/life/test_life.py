@@ -21,6 +21,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.sections.loads import RatingSection
+from exugear.gearbox.templates.kinds import template
 from exugear.gearbox.variant import VariantError
 from exugear.life.dynamic_factors import stated_factors
 from exugear.life.gear_life import flank_lives, pair_stresses, warn_beyond_tables
@@ -35,6 +36,7 @@ from exugear.system.build import assemble
 from exugear.system.kernels.meshes import FORCE
 from exugear.system.statics import locked_equilibrium, rolled_coordinates
 from exugear.system.system import Assembly
+from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from fe_ste.root_stress import MeshCycleStress
 from fe_ste.standards.pitting import nominal_contact_stress
 from fe_ste.standards.tooth_root import root_stress_factors
@@ -512,6 +514,34 @@ def test_loads_of_a_hub_need_a_body_that_stands_in_space(grc):
     rigid = grc.chosen(variant="rigid").assembly()
     with pytest.raises(VariantError, match="carrier: rotations only in the variant rigid"):
         static_balance(rigid, "carrier", np.array([240e3]), 1, hub=np.array([1.0, 0.0, 0.0, 0.0, 0.0]))
+
+
+@pytest.mark.parametrize("centre_of_mass", [26.8, 80.0])
+def test_loads_of_a_hub_act_where_the_file_states_it(centre_of_mass):
+    """As a constant force does there, wherever the centre of mass of the body is."""
+    content = tomllib.loads(template("parallel"))
+    content["bodies"]["output"]["inertia"]["discs"]["centre_of_mass_z_mm"] = centre_of_mass
+    source = {"file": "duty.csv", "skip_s": 0.0, "hours_per_year": 1.0, "hub_moments": ["a_N_m", "b_N_m"]}
+    content["loads"] |= {"body": "output", "hub_z_mm": 200.0, "sources": {"duty": source}}
+    alone = Gearbox.from_dict(content)
+    force = {"body": "output", "z_mm": 200.0, "force_N": [0.0, 100.0, 0.0]}
+    loaded = Gearbox.from_dict({**content, "forces": {"hub": force}})
+    plain, with_hub, with_force = (
+        static_balance(assemble(own, Choice("bushing", "iso6336"), stiffness), "output", np.array([900.0]), 1, hub=hub)
+        for own, hub in ((alone, None), (alone, np.array([0.0, 100.0, 0.0, 0.0, 0.0])), (loaded, None))
+        for stiffness in [mesh_stiffness(own, "iso6336")]
+    )
+    by_hub = with_hub.bearing_load.by_hub[-1, 1]
+    change = (with_force.bearing_load.values[-1] - plain.bearing_load.values[-1]) / 100.0
+    assert by_hub == pytest.approx(change, abs=1e-5)
+    assert np.abs(by_hub).max() > 0.5
+
+
+def test_a_place_of_hub_loads_without_hub_loads_is_refused():
+    content = tomllib.loads(template("parallel"))
+    content["loads"]["hub_z_mm"] = 200.0
+    with pytest.raises(GearboxFileError, match=r"hub_z_mm = 200: no source has hub loads; set hub_forces or"):
+        Gearbox.from_dict(content)
 
 
 def test_channels_of_a_hub_are_read_with_their_sense(tmp_path):

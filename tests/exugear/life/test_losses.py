@@ -125,6 +125,13 @@ def test_seals_that_cannot_be_meant_are_refused(oiled: Gearbox, seal: dict, mess
         oiled.varied({"seals": {"lip": {"diameter_mm": 100.0, **seal}}})
 
 
+def test_an_input_that_takes_power_is_a_warning(template: Path) -> None:
+    """The rated speed has no sign: with it, a gearbox that turns in the negative sense takes power at its input."""
+    text = "have opposite signs: it takes power instead of supplying it"
+    assert text not in exugear("losses", template).stderr
+    assert text in " ".join(exugear("losses", template, "--speed", -1500).stderr.split())
+
+
 def test_friction_of_meshes_grows_with_torque_to_the_power_of_one_fifth(oiled: Gearbox, found: Losses) -> None:
     torque = {"static_load.torques_N_m": {"carrier": 120e3}}
     half = losses_of(oiled.varied(torque), (), {}, operating_speed(oiled))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -14,10 +15,11 @@ import xarray as xr
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.project import Project
 from exugear.results.run_file import load_run
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.transient import recorder, runup
-from exugear.transient.outcome import Progress
+from exugear.transient.outcome import Progress, RunError
 from fe_ste.tools.files import FileError
 from fe_ste.transmission_error.table import MeshTable
 
@@ -146,7 +148,7 @@ def test_a_full_disk_ends_each_verb_with_a_sentence(case: Path, small_disk: Path
                     break
     refused = exugear("run", case, "--variant", "rigid", "--mesh-model", "iso6336", "--duration", 0.1, "--out", out)
     assert refused.exit_code == 2
-    assert f"{out} has 0 GB free" in refused.stderr
+    assert f"{out} has 0 GB free; free some space or use another results folder" in refused.stderr
     verbs = [
         ("modes", case, "--variant", "bushing", "--mesh-model", "iso6336", "--out", out),
         ("view", case, "--variant", "rigid", "--mesh-model", "iso6336", "--out", out),
@@ -203,6 +205,17 @@ def test_a_second_process_on_a_run_is_turned_away_and_changes_nothing(case: Path
         assert first.wait(timeout=120) == 0, first.stderr.read()
     assert [path.name for path in (out / DIRECTORY).iterdir()] == ["run.nc"]
     assert load_run(out / DIRECTORY / "run.nc").attrs["complete"] == 1
+
+
+@pytest.mark.usefixtures("terminal_signals")
+def test_a_run_of_a_changed_file_is_refused_without_hashes(case: Path, tmp_path: Path) -> None:
+    project = Project.from_toml(case, tmp_path, Choice("rigid", "iso6336"))
+    stopped = project.run(duration=2.0, progress=lambda at: os.kill(os.getpid(), signal.SIGINT))
+    assert not stopped.complete
+    heavier = project.gearbox.varied({"bodies.shaft_1.inertia.disc.mass_kg": 1.1})
+    changed = Project(heavier, tmp_path, project.choice)
+    with pytest.raises(RunError, match="other input: the gearbox file or its tables have changed since; run it again"):
+        changed.run(resume=True)
 
 
 def test_what_an_earlier_version_left_is_refused_and_what_is_complete_is_said(case: Path, tmp_path: Path) -> None:
