@@ -12,12 +12,12 @@ REDUCTION = 2
 #: Eigenmodes (`exugear.system.modes`, and the models and matrices of `exugear.system.system`).
 MODES = 5
 #: Runs in time (`exugear.transient`, both solvers, the models, signals and filters).
-RUN = 13
+RUN = 14
 #: Life of gears and bearings (`exugear.life`, and the root stress of `fe_ste.root_stress`).
-LIFE = 12
+LIFE = 13
 #: Steady-state responses (`exugear.steady`, and all methods that modes use).
 STEADY = 34
 #: Comparisons with measured run-ups (`exugear.steady.evaluation`, `exugear.results.order_tracking`).
 MEASURED = 5
 #: Points of studies (`exugear.studies`: their outputs; the methods that these use have their own versions).
-STUDY = 4
+STUDY = 5
