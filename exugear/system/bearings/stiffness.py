@@ -352,18 +352,27 @@ SPACING = 1e-6
 
 
 def planet_families(bodies: Iterable[Body]) -> list[list[Body]]:
-    """Find the sets of planets: those of one family on one carrier that turns."""
+    """Find the sets of planets: those of one family on one carrier that turns.
+
+    They are in the order of their angles from the first one on, whichever order the gearbox file lists them in: waves
+    around the carrier, such as the alternating one, count from planet to planet.
+    """
     families: dict[tuple[str, str], list[Body]] = {}
     for body in bodies:
         if body.carrier is not None:
             families.setdefault((body.carrier, body.family), []).append(body)
-    return list(families.values())
+    return [sorted(planets, key=lambda planet: _behind(planets[0], planet)) for planets in families.values()]
+
+
+def _behind(first: Body, planet: Body) -> float:
+    """Angle from one planet to another in the sense of rotation, 0 to 2 pi."""
+    return (planet.orbit_angle - first.orbit_angle) % (2.0 * math.pi)
 
 
 def equally_spaced(planets: Sequence[Body]) -> bool:
     """Return whether three or more planets of a set are at equal distances around their carrier."""
     spacing = 2.0 * math.pi / len(planets)
-    turned = np.array([planet.orbit_angle - planets[0].orbit_angle for planet in planets]) % (2.0 * math.pi)
+    turned = np.array([_behind(planets[0], planet) for planet in planets])
     return len(planets) >= FEWEST and bool(np.abs(turned - spacing * np.arange(len(planets))).max() <= SPACING)
 
 

@@ -81,6 +81,18 @@ def test_equal_planets_taken_one_by_one_give_the_response_of_their_waves(monkeyp
     assert max(beside) < 1e-5 * size
 
 
+def test_equally_spaced_planets_may_be_listed_against_the_sense_of_rotation():
+    """The response is that of the same planets in the order of their angles, in multi-blade coordinates as well."""
+    known, found = (
+        solver_of(train(placed(gear_trains.planetary("ring"), angles)), (50.0, 150.0), "parametric", 5)
+        for angles in ((0.0, 120.0, 240.0), (0.0, -120.0, -240.0))
+    )
+    assert [planets.waves for planets in found.model.system.frame.sets] == [3]
+    lines, others = lines_by_order(known, 90.0), lines_by_order(found, 90.0)
+    size = np.linalg.norm([line for index, line in lines.items() if any(index)])
+    assert max(abs(others[index] - line) for index, line in lines.items() if any(index)) < 1e-9 * size
+
+
 def force_apart(solver, speed, assembly, name):
     """Difference of the amplitudes of all lines of a signal between run and response, their size, and the mean."""
     response = solver.response(speed)
