@@ -125,7 +125,7 @@ def whole_of(gearbox: Gearbox, speeds: SpeedRange) -> dict[str, Any]:
     at = np.linspace(0.4, 1.0, AT_SPEEDS) * speeds.values[-1]
     models: list[HarmonicBalanceModel] = []
     prepared = timed(lambda: models.append(harmonic_balance_model(assembly, at)))
-    chosen = timed(lambda: models.append(with_needed_neighbours(models[0], judged_speeds(at[0], at[-1], ()))[0]))
+    chosen = timed(lambda: models.append(with_needed_neighbours(models[0], judged_speeds(at, ()))[0]))
     solver = PointSolver(models[1], "parametric")
     solver.response(float(at[0]))  # loads the compiled code
     solved = timed(lambda: [signals(solver.model, solver.response(float(speed))) for speed in at])

@@ -10,7 +10,7 @@ from __future__ import annotations
 #: Reduced flexible bodies (`exugear.system.bodies`), which runs and modes use.
 REDUCTION = 2
 #: Eigenmodes (`exugear.system.modes`, and the models and matrices of `exugear.system.system`).
-MODES = 5
+MODES = 6
 #: Runs in time (`exugear.transient`, both solvers, the models, signals and filters).
 RUN = 14
 #: Life of gears and bearings (`exugear.life`, and the root stress of `fe_ste.root_stress`).

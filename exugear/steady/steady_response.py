@@ -367,8 +367,7 @@ def response_of(
     neglected = 0.0
     if model.waves.neighbours and not model.loses_contact:
         every = model.lines.index
-        met = [(one.line, one.speed) for one in found]
-        judged = judged_speeds(float(even.min()), float(even.max()), met, operation)
+        judged = judged_speeds(even, [(one.line, one.speed) for one in found], operation)
         model, neglected = with_needed_neighbours(model, judged, prepared)
         solver = PointSolver(model, settings.method)
         found = tuple(replace(one, line=int(model.lines.find(every[one.line])[0])) for one in found)
@@ -391,13 +390,6 @@ def response_of(
         raise HarmonicBalanceError(str(points.remark[0]))
     solved = points if is_solved.all() else points.part(is_solved)
     linear = solver.linear
-    frozen = linear.frozen
-
-    def explained(crossing: Crossing) -> tuple[int, Contributions]:
-        """Line of a crossing and what makes it at its peak."""
-        speed = loudest_near(frozen, crossing.speed, 2.0 * crossing.damping, crossing.line)
-        return crossing.line, contributions(frozen, speed, crossing.line)
-
     strongest = () if linear.loses_contact else found[:PEAKS_WITH_CONTRIBUTIONS]
     band = no_band(tuple(quantity.name for quantity in linear.quantities))
     if settings.method != "nonlinear" and not linear.loses_contact:
@@ -417,7 +409,7 @@ def response_of(
         solved=solved,
         unsolved=tuple(zip(points.speed[~is_solved].tolist(), points.remark[~is_solved].tolist(), strict=True)),
         crossings=found,
-        contributions=tuple(each_in_forks(explained, strongest)),
+        contributions=tuple(each_in_forks(partial(_explained, linear.frozen), strongest)),
         sound_contributions=tuple(_sound_contributions(linear, solved, operation)),
         folds=folds,
         branch_ended=ended,
@@ -434,6 +426,12 @@ def response_of(
         band=band,
         campbell=campbell_of(linear.system, tracks),
     )
+
+
+def _explained(model: HarmonicBalanceModel, crossing: Crossing) -> tuple[int, Contributions]:
+    """Line of a crossing, and what makes it at its peak."""
+    speed = loudest_near(model, crossing.speed, 2.0 * crossing.damping, crossing.line)
+    return crossing.line, contributions(model, speed, crossing.line)
 
 
 def _sound_contributions(

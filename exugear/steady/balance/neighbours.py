@@ -36,18 +36,20 @@ Vibration = list[Complexes]
 
 
 def judged_speeds(
-    low: float, high: float, crossings: Iterable[tuple[int, float]], operation: tuple[float, float] | None = None
+    speeds: Floats, crossings: Iterable[tuple[int, float]], operation: tuple[float, float] | None = None
 ) -> Floats:
-    """Return the speeds (rad/s) at which the neighbours of lines are judged, between two speeds.
+    """Return the speeds (rad/s) at which the neighbours of lines are judged, in the range of some speeds.
 
     Parameters
     ----------
+    speeds : (n,) of the overall input, rad/s, of one sense
     crossings : lines, and speeds at which they meet a mode, the strongest first
     operation : operating speed range, rad/s without sign
     """
     strongest: dict[int, float] = {}
     for line, speed in crossings:
         strongest.setdefault(line, speed)
+    low, high = float(speeds.min()), float(speeds.max())
     even = np.linspace(low, high, EVEN)
     if operation is not None:
         within = math.copysign(1.0, low + high) * np.linspace(*operation, IN_OPERATION)
