@@ -194,6 +194,8 @@ MONITOR_SHAPE = (5, 3)
 """Shape of the monitored values."""
 TENSILE_ROW = MESH_TIMES.index("tensile_time")
 """Row of the times of meshes in which they pull."""
+EXTRAPOLATED_ROW = MESH_TIMES.index("extrapolation_time")
+"""Row of the times in which they are outside the range of their table."""
 NOT_CONVERGED_ROW = MESH_TIMES.index("interpolation_time")
 """Row of the times in which they read a table next to states that have not converged."""
 WHOLLY = 0.9
@@ -329,20 +331,22 @@ class ValidityMonitor:
         simulated : time so far, s
         """
         return (
-            *self._energy_words(),
+            *self._energy_words(mesh_times[EXTRAPOLATED_ROW]),
             *self._speed_words(),
             *self._deflection_words(),
             *self._tensile_warning(mesh_times[TENSILE_ROW] / max(simulated, 1e-300)),
             *self._not_converged_warning(mesh_times[NOT_CONVERGED_ROW]),
         )
 
-    def _energy_words(self) -> Iterator[str]:
+    def _energy_words(self, extrapolated: Floats) -> Iterator[str]:
+        """Say that energy is missing, and why; the times (meshes,) of extrapolation beyond a table, s, are a cause."""
         largest, since, _ = self.figures[ENERGY]
+        beyond = "the extrapolation beyond the table does not conserve energy, " if extrapolated.any() else ""
         if largest > self.limits.energy_marked:
             yield (
                 f"energy: from t = {since:.4g} s on the energy balance error exceeds "
                 f"{percent_text(self.limits.energy_marked)} of the largest energy in the run, maximum "
-                f"{percent_text(largest)}; the motion is unstable, or the time step is too large"
+                f"{percent_text(largest)}; {beyond}the motion is unstable, or the time step is too large"
             )
 
     def _speed_words(self) -> Iterator[str]:

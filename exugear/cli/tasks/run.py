@@ -194,7 +194,7 @@ def _outcome(
         failure = "\n".join([what, *finished.reasons])
     return Outcome(
         verdict=f"{summary['simulated_s']:.4g} s simulated in {summary['wall_s']:.3g} s: final input speed "
-        f"{significant(abs(summary['input_speed_rpm']), 3)} rpm",
+        f"{significant(summary['input_speed_rpm'], 3)} rpm",
         summary={key: None if key in unknown else value for key, value in summary.items()},
         findings=[own for own in found if own.level != "error" and own.text not in said],
         path=finished.path,

@@ -216,6 +216,15 @@ def test_each_limit_has_its_words_and_stops_where_it_says():
         assert seen(judge) == reasons  # results so far is not forgotten
 
 
+def test_energy_that_an_extrapolated_table_gives_names_the_extrapolation():
+    judge = judged()
+    seen(judge, left=2.0)
+    times = np.zeros((len(MESH_TIMES), 1))
+    times[MESH_TIMES.index("extrapolation_time")] = 0.1
+    (reason,) = judge.reasons(times, 0.1)
+    assert "the extrapolation beyond the table does not conserve energy" in reason
+
+
 @pytest.mark.usefixtures("terminal_signals")
 def test_a_resumed_run_keeps_its_verdict(tmp_path, monkeypatch):
     monkeypatch.setattr("exugear.transient.recorder.FLUSH_INTERVAL", 0.0125)
