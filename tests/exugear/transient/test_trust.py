@@ -218,6 +218,7 @@ def test_each_limit_has_its_words_and_stops_where_it_says():
 
 def test_energy_that_an_extrapolated_table_gives_names_the_extrapolation():
     judge = judged()
+    seen(judge)
     seen(judge, left=2.0)
     times = np.zeros((len(MESH_TIMES), 1))
     times[MESH_TIMES.index("extrapolation_time")] = 0.1
