@@ -102,7 +102,7 @@ class FlankSheet:
     remarks: tuple[str, ...]
     """Conditions outside the range of the standard."""
     sense: int = 1
-    """Sign of the loaded body's torque: 1, or -1 for reversed load."""
+    """1 where the load has the sense of the static load, -1 where it is reversed."""
     other_edition: Mapping[str, float] = field(default_factory=dict)
     """Values of the other edition that differ by more than 1 %, SI."""
 
@@ -185,9 +185,15 @@ def _flank(
         finite_elements=beside,
         lacking=lacking,
         remarks=root_stress_factors(rules.pair, tooth.member).outside_validity,
-        sense=sense,
+        sense=sense * _static_sense(gearbox, counted.body, gearbox.meshes[tooth.meshes[0]].name),
         other_edition={name: value for name, value in other.items() if _differs(found.get(name, math.nan), value)},
     )
+
+
+def _static_sense(gearbox: Gearbox, body: str, mesh: str) -> int:
+    """Sign of the torque on a body that loads a mesh as the static load does."""
+    static = gearbox.train.static_mesh_forces()[mesh]
+    return -1 if static * gearbox.train.static_mesh_forces({body: 1.0})[mesh] < 0.0 else 1
 
 
 def _differs(value: float, other: float) -> bool:

@@ -275,6 +275,23 @@ def test_the_nominal_load_is_the_static_one_at_rated_speed_with_k_a(tmp_path):
     assert not (tmp_path / "results").exists()
 
 
+@pytest.mark.parametrize("static", [100.0, -100.0])
+def test_a_load_is_reversed_against_the_static_load_and_not_against_the_z_axis(tmp_path, static):
+    content = spur(tmp_path)
+    content["static_load"]["torques_N_m"] = {"shaft_1": static}
+    for strength in content["rating"]["gears"].values():
+        strength["mean_stress_factor"] = 0.7
+    content["loads"] = {"body": "shaft_1", "life_years": 1.0, "sources": {"one": {"file": "loads.csv"}}}
+    (tmp_path / "loads.csv").write_text("torque_N_m,speed_rpm,hours\n100,1500,50\n-100,1500,50\n")
+    flanks = project_of(content, tmp_path).rating().flanks
+    of_sense = {(flank.gear, flank.flank): flank.sense for flank in flanks}
+    usual = "+" if static > 0.0 else "-"
+    assert {flank: sense for (gear, flank), sense in of_sense.items() if gear == "pinion"} == {
+        usual: 1,
+        {"+": "-", "-": "+"}[usual]: -1,
+    }
+
+
 def test_loads_that_teeth_do_not_feel_are_left_out(tmp_path):
     """A torque of a millionth of a newton metre has no line load to rate; alone it leaves no flank."""
     content = spur(tmp_path)
