@@ -19,7 +19,7 @@ from exugear.steady.mean_system.mean_system import Steps
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.processes import each_in_forks
 
-CARRIED = (0.05, 0.02, 0.01, 3e-3, 1e-3)
+CARRIED = (0.05, 0.035, 0.02, 0.01, 3e-3, 1e-3)
 """Shares of the highest line of its order that a line has to have in some quantity at one of the speeds, tried one
 after the other."""
 SMALL = 0.1
