@@ -270,8 +270,8 @@ def _passing(data: xr.Dataset) -> Iterator[Finding]:
     named = " and ".join(carriers)
     angles = "angles" if several else "angle"
     text = f"stiffness varies with the {angles} of {named}: {count} orders of passing planets and beside mesh orders "
-    text += f"are included; those left out change a mesh order by at most {100.0 * left_out:.1g} % of its amplitude, "
-    text += "or of a tenth of the highest order"
+    text += "are included; at the speeds where they were chosen, those left out change a mesh order by at most "
+    text += f"{100.0 * left_out:.1g} % of its amplitude, or of a tenth of the highest order"
     yield Finding("warning" if left_out > NOTICED_NEIGHBOURS else "note", text, left_out)
     over_angle = data["mode_over_angle"].to_numpy()
     if over_angle.size:
